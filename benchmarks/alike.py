@@ -20,16 +20,17 @@ from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.physics import PhysicsConfig
 from interfaces.runtime.plan import PlannedMotion, RunPlan
-from interfaces.runtime.session import SETTLE, run_twins, simulated_puma
+from interfaces.runtime.session import SETTLE, run_twins
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
-from robots import puma560
+from robots import load
 from vrs import JointTarget, MotionCommand
 from vrs.comparison import agreement, compare_paths
 from vrs.model import Array
 
-MODEL = puma560.model()
+ROBOT = load("puma560")
+MODEL = ROBOT.arm
 NOMINAL = MODEL.poses["nominal"]
 PROFILE = os.environ.get("VRS_ALIKE_DELAY", "tue")
 RUNS = int(os.environ.get("VRS_ALIKE_RUNS", "12"))
@@ -69,7 +70,7 @@ def in_laboratory(seed: int) -> tuple[float, ...]:
     """A run in virtual time."""
     motions = tuple(PlannedMotion(f"command {i}", t, c) for i, (t, c) in enumerate(commands(SETTLED)))
     plan = RunPlan("alike", NOMINAL, motions, ())
-    run = run_twins(plan, MODEL, delay_profile(PROFILE), simulated_puma(), seed=seed)
+    run = run_twins(plan, ROBOT, delay_profile(PROFILE), seed=seed)
     rows = (run.t >= SETTLED - 0.5) & (run.t <= SETTLED + LONG)
     return figures(run.t[rows], run.q_shown[rows], run.q_real[rows], run.q_reference[rows])
 
@@ -79,7 +80,7 @@ async def live(seed: int) -> tuple[float, ...]:
     async with contextlib.AsyncExitStack() as stack:
         listening = sockets.bind("127.0.0.1", 0)
         port = listening.getsockname()[1]
-        body = PhysicsBody(MODEL, PhysicsConfig(MODEL.limits, NOMINAL))
+        body = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL))
         robot = LiveRobot(body, Access(free={Role.SITE}))
         app = application(robot.routes, hosts(["127.0.0.1"], port))
         await stack.enter_async_context(sockets.serve(app, listening, largest=LARGEST))
@@ -87,7 +88,7 @@ async def live(seed: int) -> tuple[float, ...]:
         await robot.ready()
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(PROFILE)))
         at = f"ws://127.0.0.1:{port}/site"
-        operator = LiveOperator(LiveOperatorConfig(MODEL, NOMINAL, at, way, seed=seed), Access(free=OPEN))
+        operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, at, way, seed=seed), Access(free=OPEN))
         await stack.enter_async_context(operator.running())
         site, clock = operator.operator, operator.clock
         async with asyncio.timeout(20):

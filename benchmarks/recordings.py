@@ -36,11 +36,12 @@ from interfaces.stream.access import Access, hosts
 from interfaces.stream.server import application
 from interfaces.system import module_process
 from interfaces.teleop import RobotHostConfig, RobotSiteConfig
-from robots import puma560
+from robots import load
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.comparison import agreement, compare_paths
 
-MODEL = puma560.model()
+ROBOT = load("puma560")
+MODEL = ROBOT.arm
 NOMINAL = MODEL.poses["nominal"]
 SECONDS = 300.0
 """How long each is driven unless asked otherwise [s]."""
@@ -73,7 +74,7 @@ class LoggingBody(PhysicsBody):
 async def serve_robot(file: Path) -> None:
     """Be the robot until standard input ends; then write its log, and what its own timeline says."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=1 / 60), lead=LEAD)
-    body = LoggingBody(PhysicsConfig(MODEL.limits, NOMINAL), host)
+    body = LoggingBody(PhysicsConfig(ROBOT, NOMINAL), host)
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     robot = LiveRobot(body, Access(free={Role.SITE}))

@@ -13,16 +13,18 @@ from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.runs.summary import summarize
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
-from robots import puma560
+from interfaces.runtime.session import run_twins
+from robots import load
+from robots.robot import exact_arm
 
-model = puma560.model()
+robot = load("puma560")
+model = robot.arm
 line = b'{"issue": %d, "move": [%d, 60, -170, 0, 30, 0], "speed": 0.6}'
 plan = parse_plan(b"\n".join(line % (k, 40 - 80 * (k % 2)) for k in range(4)), "to and fro", model)
 
 # `vrs demo` and `vrs run` do this by themselves: run.mcap lies beside the report.
 recorder = RunRecorder(Path("run.mcap"))
-run = run_twins(plan, model, delay_profile("tue"), exact_arm, seed=3, keeper=recorder)
+run = run_twins(plan, robot, delay_profile("tue"), exact_arm, seed=3, keeper=recorder)
 recorder.finish()
 
 with open_recording("run.mcap") as recording:

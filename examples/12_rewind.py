@@ -13,14 +13,16 @@ from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
 from interfaces.recording.run_recorders import RunRecorder
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
-from robots import puma560
+from interfaces.runtime.session import run_twins
+from robots import load
+from robots.robot import exact_arm
 
-model = puma560.model()
+robot = load("puma560")
+model = robot.arm
 line = b'{"issue": %.1f, "move": [%d, 60, -170, 0, 30, 0], "speed": 0.4}'
 plan = parse_plan(b"\n".join(line % (0.7 * k, 40 - 80 * (k % 2)) for k in range(4)), "redirected", model)
 recorder = RunRecorder(Path("run.mcap"))
-run_twins(plan, model, delay_profile("tue"), exact_arm, seed=3, keeper=recorder)
+run_twins(plan, robot, delay_profile("tue"), exact_arm, seed=3, keeper=recorder)
 recorder.finish()
 
 

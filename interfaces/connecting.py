@@ -47,7 +47,7 @@ def connect_mobile(
     encoding: str = "vrs.1.msgpack",
     timeout: float = 5.0,
 ) -> MobileConnection:
-    """Reach a mobile robot that `vrs serve --robot ipr` serves; see `connect`."""
+    """Reach a mobile robot that `vrs serve --robot NAME` serves; see `connect`."""
     from interfaces.messages.control import Role
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import MobileConnection

@@ -38,7 +38,7 @@ from vrs.commands import (
 )
 from vrs.errors import InvalidValueError
 from vrs.ledger import Ledger, Receipt
-from vrs.model import Array, Limits, RobotModel, frozen_array
+from vrs.model import Array, Limits, RobotModel, frozen_array, home
 from vrs.moves import check
 from vrs.notes import Notes
 from vrs.scheduler import Scheduler
@@ -116,14 +116,9 @@ class Engine:
             raise InvalidValueError("posture", posture, f"left out: {model.name} has joints and no wheels")
         n = model.limits.dof
         if timeline is None:
-            start = frozen_array(
-                model.poses["nominal"]
-                if q is None and "nominal" in model.poses
-                else 0.5 * (model.limits.q_min + model.limits.q_max)
-                if q is None
-                else finite_array("q", q, (n,), f"finite joint values [rad], shape ({n},)")
-            )
-            model.limits.check(start)
+            allowed = f"finite joint values [rad], shape ({n},)"
+            start = home(model) if q is None else frozen_array(finite_array("q", q, (n,), allowed))
+            model.limits.check(start, model.prismatic)
             timeline = Timeline(start, clock.now() if clock is not None else 0.0)
         elif q is not None:
             raise InvalidValueError("q", q, "left out where a timeline is given")

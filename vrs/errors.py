@@ -52,9 +52,9 @@ class NonFiniteTimeError(InvalidValueError):
 class OutOfLimitsError(InvalidValueError):
     """Joint values outside the position limits."""
 
-    def __init__(self, joint: int, given: float, low: float, high: float) -> None:
+    def __init__(self, joint: int, given: float, low: float, high: float, unit: str = "rad") -> None:
         self.joint, self.low, self.high = joint, low, high
-        super().__init__(f"joint {joint + 1}", given, f"within [{low:.6g}, {high:.6g}] rad")
+        super().__init__(f"joint {joint + 1}", given, f"within [{low:.6g}, {high:.6g}] {unit}")
 
 
 class UnreachablePoseError(VrsError, ValueError):

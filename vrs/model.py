@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Protocol, runtime_checkable
 
@@ -21,9 +22,19 @@ def frozen_array(values: ArrayLike) -> Array:
     return array
 
 
+def unit_of(joint: int, prismatic: Collection[int]) -> str:
+    """Unit of a joint's position, counted from 0: `m` of a prismatic one, else `rad`."""
+    return "m" if joint in prismatic else "rad"
+
+
+def for_people(joint: int, value: float, prismatic: Collection[int]) -> tuple[float, str]:
+    """A joint's position, or what it's off by, as people are told it: in metres, or in degrees."""
+    return (value, "m") if joint in prismatic else (math.degrees(value), "deg")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Joint limits, each of shape (n,)."""
+    """Joint limits, each of shape (n,); of prismatic joints in m for rad."""
 
     q_min: Array
     """Lowest position [rad]."""
@@ -56,13 +67,13 @@ class Limits:
         """Number of joints, n."""
         return len(self.q_min)
 
-    def check(self, q: Array) -> None:
-        """Raise OutOfLimitsError unless q, shape (n,) [rad], lies within the position limits."""
+    def check(self, q: Array, prismatic: Collection[int] = ()) -> None:
+        """Raise OutOfLimitsError unless q, (n,) [rad], of prismatic joints [m], lies within the position limits."""
         # Of few numbers, plain floats are several times quicker than arrays.
         joints = zip(q.tolist(), self.q_min.tolist(), self.q_max.tolist(), strict=True)
         for j, (value, low, high) in enumerate(joints):
             if not low <= value <= high:
-                raise OutOfLimitsError(j, value, low, high)
+                raise OutOfLimitsError(j, value, low, high, unit_of(j, prismatic))
 
 
 @runtime_checkable
@@ -76,6 +87,10 @@ class RobotModel(Protocol):
     @property
     def limits(self) -> Limits:
         """Joint limits."""
+
+    @property
+    def prismatic(self) -> Collection[int]:
+        """Joints that move along their axes, counted from 0: their values are in m where others' are in rad."""
 
     @property
     def poses(self) -> Mapping[str, Array]:
@@ -125,3 +140,9 @@ class RobotModel(Protocol):
 
     def configuration(self, q: ArrayLike) -> str:
         """Name of the arm configuration at q, for example `RIGHTY ABOVE NOFLIP`."""
+
+
+def home(model: RobotModel) -> Array:
+    """Where an arm stands unless told otherwise, (n,): its pose `nominal`, or amid its joints' ranges."""
+    found = model.poses.get("nominal")
+    return frozen_array(0.5 * (model.limits.q_min + model.limits.q_max) if found is None else found)

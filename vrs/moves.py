@@ -74,10 +74,10 @@ def solve(target: Target, model: RobotModel, q: Array) -> Array:
         InvalidValueError: If the configuration isn't one.
     """
     if isinstance(target, JointTarget):
-        model.limits.check(target.q)
+        model.limits.check(target.q, model.prismatic)
         return target.q
     solution = model.inverse_near(target.X, q, target.configuration)
-    model.limits.check(solution)
+    model.limits.check(solution, model.prismatic)
     return solution
 
 
@@ -190,7 +190,7 @@ def _planned(
 
         seen = tooled(model, command.tool)
         if isinstance(target, JointTarget):
-            model.limits.check(target.q)
+            model.limits.check(target.q, model.prismatic)
             X = seen.forward(target.q)
             plan, notes = line(state, X, speed, profile, seen, limits, q_goal=target.q)
             return plan, target.q, notes

@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from interfaces.cli.options import RobotName, val_robot
 from interfaces.cli.run import text_of
+from robots.robot import USUAL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from interfaces.val2.errors import CheckFinding
     from interfaces.val2.source import SourceFile
+    from vrs.model import RobotModel
 
 SUFFERED = 2
 """Exit code for a program that is wrong."""
@@ -26,6 +29,7 @@ def check(
     static: Annotated[
         bool, typer.Option("--static", help="Only read the programs; don't plan what the first would do.")
     ] = False,
+    name: RobotName = USUAL,
     as_json: Annotated[bool, typer.Option("--json", help="Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with a program: undefined names and labels, mixed types, places out of reach.
@@ -37,7 +41,7 @@ def check(
     source, found = check_text(text_of(program), program.name)
     wrong = any(finding.severity == "error" for finding in found)
     if source is not None and not static and not wrong:
-        found += _rehearsed(source)
+        found += _rehearsed(source, val_robot(name).arm)
     found = _once(found)
     wrong = any(finding.severity == "error" for finding in found)
     if as_json:
@@ -47,15 +51,11 @@ def check(
     return SUFFERED if wrong else 0
 
 
-def _rehearsed(source: SourceFile) -> list[CheckFinding]:
+def _rehearsed(source: SourceFile, model: RobotModel) -> list[CheckFinding]:
     """What only planning shows: the first program on a virtual arm alone."""
     from interfaces.val2.playing import rehearse
-    from robots import puma560
 
-    return [
-        replace(found, error=found.error.at(place=found.place))
-        for found in rehearse(source, puma560.model()).findings
-    ]
+    return [replace(found, error=found.error.at(place=found.place)) for found in rehearse(source, model).findings]
 
 
 def _once(found: list[CheckFinding]) -> list[CheckFinding]:

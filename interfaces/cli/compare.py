@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from interfaces.cli.options import RecordedRobot, recorded_robot
 from interfaces.report.tables import FIGURES, shown
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ ROWS = {"arm": ARM_ROWS, "mobile": MOBILE_ROWS}
 def compare(
     recording: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
     other: Annotated[Path | None, typer.Argument(metavar="OTHER.mcap", help="Another to set beside it.")] = None,
+    name: RecordedRobot = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write the figures as JSON on standard output.")] = False,
 ) -> None:
     """Say how far apart the twins of a recording were, and why.
@@ -57,8 +59,10 @@ def compare(
     from interfaces.recording.recording import check_alike, open_recording
     from interfaces.runs.summary import to_json
 
+    robot = recorded_robot(name)
     with ExitStack() as stack:
-        opened = [stack.enter_context(open_recording(path)) for path in (recording, other) if path is not None]
+        paths = [path for path in (recording, other) if path is not None]
+        opened = [stack.enter_context(open_recording(path, robot)) for path in paths]
         check_alike(opened)
         kind = opened[0].kind.word
         first, *others = (_summary(one) for one in opened)

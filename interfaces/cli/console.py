@@ -14,13 +14,17 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from interfaces.cli.options import RobotName, val_robot
 from interfaces.system import software
+from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
+from vrs.model import home
 
 if TYPE_CHECKING:
     from interfaces.val2.monitor.control import Control
     from interfaces.val2.monitor.monitor import TerminalMonitor
     from interfaces.val2.motion import Arm
+    from robots.robot import Robot
     from vrs.clock import Clock
 
 START: Final = 90.0
@@ -43,6 +47,7 @@ def console(
     alone: Annotated[
         bool, typer.Option("--alone", help="A virtual arm in this process only: no real one, no page.")
     ] = False,
+    name: RobotName = USUAL,
     delay: Annotated[
         str,
         typer.Option("--delay", metavar="PROFILE", help="Emulated on the way to the robot that this begins."),
@@ -51,7 +56,7 @@ def console(
         Path, typer.Option("--files", metavar="DIR", help="Where LOAD and STORE find files.")
     ] = Path(),
 ) -> None:
-    """Move a PUMA 560 by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""
+    """Move an arm by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""
     from interfaces.link import delay_profile
 
     if connect is not None and alone:
@@ -60,30 +65,32 @@ def console(
         raise InvalidValueError("token-file", str(token_file), "left out without --connect")
     if delay != "none" and (alone or connect is not None):
         raise InvalidValueError("delay", delay, "left out with --connect and --alone: no robot is begun here")
+    if name != USUAL and connect is not None:
+        raise InvalidValueError("robot", name, "left out with --connect: the server has its own")
+    robot = val_robot(name)
     if not files.is_dir():
         raise InvalidValueError("files", str(files), "a directory")
     delay_profile(delay)
     if alone:
-        _alone(files)
+        _alone(robot, files)
     elif connect is not None:
         _connected(connect, token_file, files)
     else:
         typer.echo("vrs: starting both robots ..", err=True)
-        with local_server(["--delay", delay, "--link-loss", "hold"]) as url:
+        with local_server(["--robot", name, "--delay", delay, "--link-loss", "hold"]) as url:
             typer.echo(f"vrs: {url}/view shows both robots", err=True)
             _connected(url, None, files)
 
 
-def _alone(files: Path) -> None:
+def _alone(robot: Robot, files: Path) -> None:
     from interfaces.val2.monitor.control import Control
     from interfaces.val2.motion import arm_for
-    from robots import puma560
     from vrs.clock import ManualClock, WallClock
     from vrs.engine import Engine
 
-    model = puma560.model()
-    engine = Engine(model, q=model.poses["nominal"], clock=ManualClock(0.0))
-    _converse(arm_for(engine), Control(), WallClock(), files, f"{software()}, a virtual {model.name} alone")
+    model = robot.arm
+    engine = Engine(model, q=home(model), clock=ManualClock(0.0))
+    _converse(arm_for(engine), Control(), WallClock(), files, f"{software()}, a virtual {robot.name} alone")
 
 
 def _connected(url: str, token_file: Path | None, files: Path) -> None:

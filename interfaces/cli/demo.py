@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import Delay, Offset, Order, Out
+from interfaces.cli.options import Delay, Offset, Order, Out, RobotName
+from robots.robot import USUAL, load
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from interfaces.runs.summary import Attribution, OffsetOutcome
     from interfaces.runs.twin_run import TwinRun
     from interfaces.runtime.plan import RunPlan
-    from vrs.model import RobotModel
+    from robots.robot import Robot
 
 ADAPTIVE = "adaptive"
 DEFAULT_DELAY = "thu"
@@ -36,6 +37,7 @@ def demo(
         Path | None,
         typer.Option("--commands", metavar="FILE", help="Plan file, JSON lines; the demo's own without it."),
     ] = None,
+    name: RobotName = USUAL,
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
@@ -51,15 +53,14 @@ def demo(
     from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
     from interfaces.runtime.plan import default_plan, read_plan
-    from robots import puma560
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    model = puma560.model()
-    plan = default_plan(model) if commands is None else read_plan(commands, model)
+    robot = load(name)
+    plan = default_plan(robot.arm) if commands is None else read_plan(commands, robot.arm)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
-    run, attributions, offsets = explained(plan, recorder, model, profile, seed, D, order)
+    run, attributions, offsets = explained(plan, recorder, robot, profile, seed, D, order)
     recorder.finish(attributions, offsets)
     summary = summarize(run, attributions, offsets)
     text = write(summary, run, out)
@@ -100,7 +101,7 @@ def complain(recorder: RunRecorder) -> None:
 def explained(
     plan: RunPlan,
     whole: TwinRun | RunRecorder,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
     seed: int,
     D: float | None,
@@ -111,7 +112,7 @@ def explained(
     Args:
         plan: What the operator does.
         whole: The run itself, where it has been made; else what records it.
-        model: The robot.
+        robot: Which arm.
         profile: The link's delay.
         seed: Seed of the link.
         D: The offset [s]; None adapts it.
@@ -144,7 +145,7 @@ def explained(
             else:
                 keeper = None if off or isinstance(whole, TwinRun) else whole
                 run = run_without(
-                    causes, plan, model, profile,
+                    causes, plan, robot, profile,
                     seed=seed, offset=D, service=service, progress=shown(name), keeper=keeper,
                 )  # fmt: skip
             stages.append((run, measures(run)))
@@ -152,7 +153,7 @@ def explained(
         for other in (None, fixed_offset(FIXED, profile) if D is None else D):
             progress = shown(f"offset {spelled(other)}")
             outcome = offset_outcome(
-                plan, model, profile, seed=seed, offset=other, service=service, progress=progress
+                plan, robot, profile, seed=seed, offset=other, service=service, progress=progress
             )
             offsets.append(outcome)
             finished()

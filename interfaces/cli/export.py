@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from interfaces.cli.options import RecordedRobot, recorded_robot
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def export(
     to_report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE.html", help="Write its report there.")
     ] = None,
+    name: RecordedRobot = None,
 ) -> None:
     """Write a recording as tables (units are in the columns' names), or as the report of its run."""
     from interfaces.recording.export import tables, write_csv, write_parquet
@@ -33,7 +35,7 @@ def export(
     if to_csv is None and to_parquet is None and to_report is None:
         raise InvalidValueError("export", "nothing", "one or more of --csv DIR, --parquet DIR, --report FILE.html")
     written: list[Path] = []
-    with open_recording(recording) as opened:
+    with open_recording(recording, recorded_robot(name)) as opened:
         if opened.damage and to_report is None:
             typer.echo(f"vrs: {recording.name}: the recording is damaged: {opened.damage}", err=True)
         found = () if to_csv is None and to_parquet is None else tables(opened)

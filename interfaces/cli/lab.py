@@ -12,6 +12,8 @@ import typer
 from interfaces.cli.demo import prepare
 from interfaces.cli.options import PROFILES
 from interfaces.cli.reproduce import measured, show
+from interfaces.runs.drive_run import BARE
+from robots.robot import USUAL_BASE
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -128,7 +130,12 @@ def lab(
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option("--robot", metavar="R", help="ipr (unless given), micro or bare; repeatable."),
+        typer.Option(
+            "--robot",
+            metavar="NAME|MODULE:NAME",
+            help=f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the "
+            "usual one without physics; repeatable.",
+        ),
     ] = None,
     operator: Annotated[
         list[str] | None,
@@ -217,14 +224,14 @@ def lab(
     from interfaces.lab.driving.run import Kept, measure_recorded, paths
     from interfaces.lab.driving.sweep import attributed, cases
     from interfaces.link.delays import delay_profile
-    from interfaces.runs.drive_run import ROBOTS
+    from interfaces.runs.drive_run import DriveCase
     from interfaces.teleop.architectures import Constants, Transport, controller
     from interfaces.teleop.architectures.compositions import POSITIONS
     from robots.onboard.driving import Posture
 
     architectures = architecture or ["III", "timeline"]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
-    delays, robots = delay or ["thu"], [one_of("robot", r, ROBOTS) for r in robot or ["ipr"]]
+    delays, robots = delay or ["thu"], [DriveCase(robot=r).robot for r in robot or [USUAL_BASE]]
     operators, position = operator or ["mixed"], one_of("position", position or "fused", POSITIONS)
     combined_of: dict[str, Sequence[object]] = {
         "architecture": architectures, "transport": transports, "delay": delays, "robot": robots,

@@ -22,6 +22,7 @@ from interfaces.cli.options import (
     start_robot,
 )
 from interfaces.system import software
+from robots.robot import HeadCamera
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -30,19 +31,17 @@ if TYPE_CHECKING:
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
     from robots.onboard import LossPolicy
+    from robots.robot import Robot
 
-ROBOTS = ("puma560", "ipr")
-"""Robots that can be served."""
 ARCHITECTURE, ROOM, OPERATOR_LOSS, JOBS = "timeline", "empty", "stop", Path("jobs.json")
 """Unless others are asked for."""
-RobotName: TypeAlias = Annotated[str, typer.Option("--robot", metavar="NAME", help="puma560 or ipr.")]
 Architecture: TypeAlias = Annotated[
     str,
     typer.Option(
         "--architecture",
         metavar="NAME",
-        help="Of an ipr, what it does with the operator's path: I, II, III, III-capped, extended, timeline, or "
-        "MODULE:NAME of your own.",
+        help="Of a mobile robot, what it does with the operator's path: I, II, III, III-capped, extended, "
+        "timeline, or MODULE:NAME of your own.",
     ),
 ]
 CAMERA = 6.0
@@ -50,7 +49,7 @@ CAMERA = 6.0
 CameraRate: TypeAlias = Annotated[
     float,
     typer.Option(
-        "--camera", metavar="RATE", help="Of an ipr, pictures a second of its camera, 1 to 30; 0 for no camera."
+        "--camera", metavar="RATE", help="Pictures a second of a robot's camera, 1 to 30; 0 for no camera."
     ),
 ]
 OperatorLossName: TypeAlias = Annotated[
@@ -58,7 +57,7 @@ OperatorLossName: TypeAlias = Annotated[
     typer.Option(
         "--operator-loss",
         metavar="POLICY",
-        help="Of an ipr, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
+        help="Of a mobile robot, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
     ),
 ]
 RoomName: TypeAlias = Annotated[
@@ -66,7 +65,7 @@ RoomName: TypeAlias = Annotated[
     typer.Option(
         "--room",
         metavar="NAME|FILE",
-        help="Of an ipr or with --rsp, where it drives: a room's name, or a .room file.",
+        help="Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file.",
     ),
 ]
 
@@ -114,7 +113,9 @@ def room_of(text: str) -> Room:
 
 @dataclass(frozen=True, slots=True)
 class MobileServing:
-    """What `vrs serve --robot ipr` serves, and where."""
+    """What `vrs serve` serves of a mobile robot, and where."""
+
+    robot: Robot
 
     host: str
     port: int
@@ -141,7 +142,7 @@ class MobileServing:
     def options(self) -> tuple[str, ...]:
         """Of the robot that is started."""
         return (
-            "--robot", "ipr", "--room", self.room, "--architecture", self.architecture,
+            "--robot", self.robot.found_by, "--room", self.room, "--architecture", self.architecture,
             "--max-age", f"{self.max_age:g}", "--operator-loss", self.operator_loss,
         )  # fmt: skip
 
@@ -173,20 +174,19 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         from interfaces.station.panels import MOBILE_PANELS
         from interfaces.stream.server import application
         from interfaces.val2.val_arm import lasts
-        from robots import ipr
         from robots.onboard.lease import LeaseState
 
-        model = ipr.model()
+        seeing = bool(serving.camera) and serving.robot.device(HeadCamera) is not None
         config = LiveMobileOperatorConfig(
-            model, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
+            serving.robot, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
             None if serving.jobs is None else JobFile(serving.jobs),
-            camera=CameraConfig(serving.camera) if serving.camera else None, link_loss=serving.link_loss,
+            camera=CameraConfig(serving.camera) if seeing else None, link_loss=serving.link_loss,
             arm=lasts,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
-        panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
-        station = Station({"mobile": True, "name": model.name}, panels=panels)
+        panels = tuple(panel for panel in MOBILE_PANELS if seeing or panel.name != "camera")
+        station = Station({"mobile": True, "name": serving.robot.name}, panels=panels)
         app = application([*operator.routes, *station.routes], serving.allowed(port))
         await stack.enter_async_context(station.running())
         await stack.enter_async_context(sockets.serve(app, listening))
@@ -195,7 +195,7 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
         stack.callback(tidying.cancel)
         shown = Address(host, port)
-        typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: serving {serving.robot.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         sys.stdout.flush()
         if serving.until_eof:

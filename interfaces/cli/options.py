@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
+from robots.robot import FOUND, load
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
     from robots.onboard import LossPolicy
+    from robots.robot import Robot
 
 PROFILES = (
     "none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar, gamma:MEAN,SD[,MIN], "
@@ -46,6 +48,27 @@ Order: TypeAlias = Annotated[
 ]
 Out: TypeAlias = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Where report.html, summary.json and run.mcap go.")
+]
+VAL_JOINTS = 6
+"""Joints that VAL-II's places have."""
+RobotName: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--robot",
+        metavar="NAME|MODULE:NAME",
+        help=f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own.",
+    ),
+]
+RecordedRobot: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME|MODULE:NAME",
+        help="The robot that it's of, unless its name is known.",
+    ),
+]
+BodyName: TypeAlias = Annotated[
+    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, exact or another of its own.")
 ]
 Host: TypeAlias = Annotated[
     str,
@@ -74,6 +97,28 @@ Hosts: TypeAlias = Callable[[int], frozenset[str]]
 """What the Host of a request may be, by the port that a server listens on."""
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECASE)
 """What a request's Host is made of."""
+
+
+def recorded_robot(name: str | None) -> Robot | None:
+    """The robot that `RecordedRobot` asks for, if it does."""
+    return None if name is None else load(name)
+
+
+def speaks_val(robot: Robot) -> bool:
+    """Whether VAL-II has places for a robot: an arm of six joints that turn."""
+    return not robot.is_base and robot.arm.limits.dof == VAL_JOINTS and not robot.arm.prismatic
+
+
+def val_robot(name: str) -> Robot:
+    """A robot for VAL-II.
+
+    Raises:
+        InvalidValueError: If there's none of that name, or VAL-II has no places for it.
+    """
+    robot = load(name)
+    if not speaks_val(robot):
+        raise InvalidValueError("robot", name, f"an arm of {VAL_JOINTS} joints that turn, as VAL-II has places for")
+    return robot
 
 
 def is_loopback(host: str) -> bool:

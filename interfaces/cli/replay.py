@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import Host, Port, ReachedAs, TokenFile, access_for, asked_for, end_on_signal
+from interfaces.cli.options import (
+    Host,
+    Port,
+    ReachedAs,
+    RecordedRobot,
+    TokenFile,
+    access_for,
+    asked_for,
+    end_on_signal,
+    recorded_robot,
+)
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
 
@@ -60,6 +70,7 @@ def replay(
         bool,
         typer.Option("--commands", help="Run the commands again on a fresh engine: is the timeline the same?"),
     ] = False,
+    name: RecordedRobot = None,
     host: Host = "127.0.0.1",
     port: Port = 8610,
     token_file: TokenFile = None,
@@ -82,9 +93,11 @@ def replay(
         raise InvalidValueError("json", "--json", "with --headless or --commands")
     from interfaces.stream.access import OPEN
 
+    robot = recorded_robot(name)
     access, allowed = access_for(host, token_file, free=OPEN), asked_for(host, reached_as or ())
     with ExitStack() as stack:
-        recordings = [stack.enter_context(open_recording(path)) for path in (run, other) if path is not None]
+        paths = [path for path in (run, other) if path is not None]
+        recordings = [stack.enter_context(open_recording(path, robot)) for path in paths]
         for recording in recordings:
             _warn(recording)
         if commands:

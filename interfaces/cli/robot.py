@@ -1,4 +1,4 @@
-"""vrs robot: only the real robot, for an operator's site somewhere else; with --rsp the thin client CUBO."""
+"""vrs robot: only the real robot, for an operator's site somewhere else; with --rsp a thin client."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ import typer
 from interfaces.cli.mobile import (
     ARCHITECTURE,
     OPERATOR_LOSS,
-    ROBOTS,
     ROOM,
     Architecture,
     OperatorLossName,
-    RobotName,
     RoomName,
     left_out,
     room_of,
     without,
 )
 from interfaces.cli.options import (
+    BodyName,
     Hosts,
     ReachedAs,
+    RobotName,
     TokenFile,
     access_for,
     asked_for,
@@ -36,25 +36,32 @@ from interfaces.cli.options import (
     saying_policy,
 )
 from interfaces.system import software
+from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
+from vrs.model import home
 
 if TYPE_CHECKING:
     import socket
+    from contextlib import AbstractContextManager
 
     from interfaces.link.proxy import Address
+    from interfaces.rsp.host import HostedBody
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveBody, LiveRobot
     from robots.bullet.rooms import Room
 
 
-def thin_client(address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool) -> None:
-    """Run a CUBO until a signal comes or its body fails.
+def thin_client(
+    name: str, address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool
+) -> None:
+    """Run a thin client until a signal comes or its body fails.
 
     Args:
+        name: What `robots.load` finds it by.
         address: Where it listens for RSP, HOST:PORT.
-        model: Of its devices; CUBO's own unless given.
+        model: Of its devices; its own unless given.
         room: Where it drives.
         token_file: Keys; needed off loopback, made if it's missing.
         until_eof: Whether it ends with standard input.
@@ -68,13 +75,16 @@ def thin_client(address: str, model: Path | None, room: Room, token_file: Path |
     from interfaces.link.proxy import parse_address
     from interfaces.rsp.live import bind
     from interfaces.rsp.model import read_model
-    from robots.cubo.parameters import MODEL_FILE
 
     where = parse_address("--rsp", address)
-    robot = read_model(MODEL_FILE if model is None else model)
+    client = load(name)
+    device = client.device(ThinClient)
+    if device is None:
+        raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
+    robot = read_model(device.model if model is None else model)
     keys = _keys(where.host, token_file)
     sock = bind(where.host, where.port)
-    problem = uvloop.run(_serve_rsp(robot, room, keys, sock, until_eof=until_eof))
+    problem = uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof))
     if problem:
         typer.echo(f"vrs: {problem}", err=True)
         raise typer.Exit(1)
@@ -92,7 +102,13 @@ def _keys(host: str, token_file: Path | None) -> Keyring | None:
 
 
 async def _serve_rsp(
-    model: RobotModel, room: Room, keys: Keyring | None, sock: socket.socket, *, until_eof: bool
+    made: AbstractContextManager[HostedBody],
+    device: ThinClient,
+    model: RobotModel,
+    keys: Keyring | None,
+    sock: socket.socket,
+    *,
+    until_eof: bool,
 ) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.rsp.host import RspHost
@@ -100,14 +116,15 @@ async def _serve_rsp(
     from interfaces.rsp.robot import RobotCore
     from interfaces.runtime.live.process import READY
     from interfaces.system import hasten
-    from robots.cubo.body import MOVES, CuboBody
     from vrs.clock import WallClock
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    with CuboBody(room=room) as body:
+    with made as body:
         clock = WallClock()
-        host = RspHost(RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(MOVES), now=clock.now())
+        host = RspHost(
+            RobotCore(model, secrets.token_bytes, keys=keys), body, frozenset(device.moves), now=clock.now()
+        )
         server = RspServer(host, sock, clock)
         server.failed.add_done_callback(lambda _: ended.set())
         address, port = sock.getsockname()[:2]
@@ -125,6 +142,8 @@ async def _serve_rsp(
     return "" if error is None else f"the body failed: {error}"
 
 
+POSE = "nominal"
+"""Pose to begin in, unless told otherwise; see `vrs.model.home`."""
 LISTEN = "127.0.0.1:8601"
 """Where an operator's site connects, unless told otherwise."""
 
@@ -135,18 +154,18 @@ def robot(
         typer.Option(
             "--rsp",
             metavar="HOST:PORT",
-            help="Be a thin client instead, CUBO, that is driven by RSP over UDP here.",
+            help="Be a thin client instead, that is driven by RSP over UDP here.",
         ),
     ] = None,
     rsp_model: Annotated[
         Path | None,
-        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than CUBO's own."),
+        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than its own."),
     ] = None,
     listen: Annotated[
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
     ] = LISTEN,
-    name: RobotName = "puma560",
+    name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
@@ -182,11 +201,9 @@ def robot(
             "--lead", metavar="S", help="How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay."
         ),
     ] = 0.05,
-    body: Annotated[
-        str, typer.Option("--body", metavar="BODY", help="puma560 (simulated physics) or exact (follows exactly).")
-    ] = "puma560",
+    body: BodyName = "",
     friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
-    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = "nominal",
+    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = POSE,
     reports: Annotated[
         float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
     ] = 30.0,
@@ -199,13 +216,15 @@ def robot(
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
     if rsp is not None:
         left_out("a thin client has nothing of the kind", {
-            "listen": (listen, LISTEN), "robot": (name, "puma560"), "architecture": (architecture, ARCHITECTURE),
+            "listen": (listen, LISTEN), "architecture": (architecture, ARCHITECTURE),
             "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
             "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
-            "body": (body, "puma560"), "friction": (friction, True), "pose": (pose, "nominal"),
+            "body": (body, ""), "friction": (friction, True), "pose": (pose, POSE),
             "reports": (reports, 30.0), "reached-as": (reached_as, None),
         })  # fmt: skip
-        thin_client(rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
+        thin_client(
+            USUAL_CLIENT if name == USUAL else name, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof
+        )
         return
     if rsp_model is not None:
         raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
@@ -218,16 +237,16 @@ def robot(
 
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
+    chosen = load(name)
     arms = {
-        "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, "puma560"),
-        "friction": (friction, True), "pose": (pose, "nominal"),
+        "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, ""),
+        "friction": (friction, True), "pose": (pose, POSE),
     }  # fmt: skip
     bases = {
         "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM),
         "operator-loss": (operator_loss, OPERATOR_LOSS),
     }  # fmt: skip
-    mobile = one_of("robot", name, ROBOTS) == "ipr"
-    without(name, arms if mobile else bases)
+    without(name, arms if chosen.is_base else bases)
     address = parse_address("--listen", listen)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
@@ -236,7 +255,7 @@ def robot(
     access = access_for(address.host, token_file, free={Role.SITE})
     allowed = asked_for(address.host, reached_as or ())
     made: LiveBody
-    if mobile:
+    if chosen.is_base:
         from interfaces.jobs import RunnerConfig
         from interfaces.media import Aloud
         from interfaces.messages.jobs import POLICY_SAYS, OperatorLoss
@@ -248,23 +267,20 @@ def robot(
         driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=watchdog)
         loss = OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss))
         hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
-        made = PacedBody(
-            PacedConfig(room_of(room), architecture, driven, RunnerConfig(loss=loss), hands, halting=halting)
-        )
+        jobs = RunnerConfig(loss=loss)
+        made = PacedBody(PacedConfig(chosen, room_of(room), architecture, driven, jobs, hands, halting=halting))
         kind, remark = architecture, POLICY_SAYS[loss]
     else:
         from interfaces.runtime.live.physics_body import PhysicsBody
         from interfaces.runtime.physics import PhysicsConfig
-        from interfaces.runtime.physics_messages import BodyKind
         from interfaces.teleop import RobotHostConfig, RobotSiteConfig
-        from robots import puma560
 
-        model = puma560.model()
-        q, kind = model.poses[one_of("pose", pose, sorted(model.poses))], one_of("body", body, BodyKind)
+        model = chosen.arm
+        q = home(model) if pose == POSE else model.poses[one_of("pose", pose, sorted(model.poses))]
+        physics = PhysicsConfig(chosen, q, body, friction)
         number_in("lead", lead, 0.01, 0.3, unit=" s")
         site = RobotSiteConfig(fixed_offset=_offset(offset), beat=beat, watchdog=watchdog)
-        host = RobotHostConfig(site=site, lead=lead, halting=halting)
-        made = PhysicsBody(model, PhysicsConfig(model.limits, q, BodyKind(kind), friction), host)
+        made, kind = PhysicsBody(physics, RobotHostConfig(site=site, lead=lead, halting=halting)), physics.body
         remark = ""
 
     async def main() -> str:

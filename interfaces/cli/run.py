@@ -20,8 +20,9 @@ from interfaces.cli.demo import (
     show,
     write,
 )
-from interfaces.cli.options import Delay, Offset, Order, Out
+from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, val_robot
 from interfaces.system import read_within
+from robots.robot import USUAL
 
 if TYPE_CHECKING:
     from interfaces.val2.source import SourceFile
@@ -33,6 +34,7 @@ def run(
     program: Annotated[
         Path, typer.Argument(metavar="PROGRAM.v2", help="File of VAL-II programs; its first is run.")
     ],
+    name: RobotName = USUAL,
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
@@ -52,22 +54,20 @@ def run(
     from interfaces.recording.run_recorders import RunRecorder
     from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
-    from interfaces.runtime.session import simulated_puma
     from interfaces.val2.playing import Listeners
     from interfaces.val2.twins import play
-    from robots import puma560
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, model = read(program), puma560.model()
+    source, robot = read(program), val_robot(name)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
-        source, model, profile, simulated_puma(),
+        source, robot, profile,
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
         keeper=recorder,
     )  # fmt: skip
-    whole, attributions, offsets = explained(played.plan, played.run, model, profile, seed, D, order)
+    whole, attributions, offsets = explained(played.plan, played.run, robot, profile, seed, D, order)
     recorder.finish(attributions, offsets)
     summary = summarize(whole, attributions, offsets)
     write(summary, whole, out)

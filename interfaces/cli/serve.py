@@ -15,13 +15,11 @@ from interfaces.cli.mobile import (
     CAMERA,
     JOBS,
     OPERATOR_LOSS,
-    ROBOTS,
     ROOM,
     Architecture,
     CameraRate,
     MobileServing,
     OperatorLossName,
-    RobotName,
     RoomName,
     left_out,
     room_of,
@@ -30,10 +28,12 @@ from interfaces.cli.mobile import (
 )
 from interfaces.cli.options import (
     PROFILES,
+    BodyName,
     Host,
     Hosts,
     Port,
     ReachedAs,
+    RobotName,
     TokenFile,
     abandon,
     access_for,
@@ -44,11 +44,14 @@ from interfaces.cli.options import (
     keep_quiet,
     say_lost,
     say_robot,
+    speaks_val,
     start_robot,
 )
 from interfaces.system import software
+from robots.robot import USUAL, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
+from vrs.model import home
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,6 +60,7 @@ if TYPE_CHECKING:
     from interfaces.recording.live import LiveRecording
     from interfaces.stream.access import Access
     from robots.onboard import LossPolicy
+    from robots.robot import Robot
 
 RECORDINGS = Path("recordings")
 """Where the station records to, unless told otherwise."""
@@ -65,7 +69,7 @@ RECORDINGS = Path("recordings")
 def serve(
     host: Host = "127.0.0.1",
     port: Port = 8600,
-    robot: RobotName = "puma560",
+    name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     camera: CameraRate = CAMERA,
@@ -104,7 +108,7 @@ def serve(
     ] = None,
     operator_loss: OperatorLossName = OPERATOR_LOSS,
     jobs: Annotated[
-        Path, typer.Option("--jobs", metavar="FILE.json", help="Of an ipr, where the list of jobs is kept.")
+        Path, typer.Option("--jobs", metavar="FILE.json", help="Of a mobile robot, where the list of jobs is kept.")
     ] = JOBS,
     max_age: Annotated[
         float,
@@ -114,9 +118,7 @@ def serve(
             help="Of the robot that this starts: oldest message that counts under halt [s], 0.01 to 2.",
         ),
     ] = 0.5,
-    body: Annotated[
-        str, typer.Option("--body", metavar="BODY", help="Of the robot that this starts: puma560 or exact.")
-    ] = "puma560",
+    body: BodyName = "",
     robot_at: Annotated[
         str | None,
         typer.Option("--robot-at", metavar="HOST:PORT", help="Where vrs robot listens; without it one is started."),
@@ -161,19 +163,18 @@ def serve(
     from interfaces.recording.mcap_file import Sink
     from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.live.emulation import late_often, too_slow
-    from interfaces.runtime.physics_messages import BodyKind
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.teleop.architectures import architecture as makes
     from robots.onboard import LossPolicy
 
-    one_of("robot", robot, ROBOTS)
+    robot = load(name)
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    one_of("body", body, BodyKind)
+    robot.body(body)
     if robot_at is not None:
         left_out("the robot at --robot-at has its own", {
             "offset": (offset, "adaptive"), "max-age": (max_age, 0.5),
-            "body": (body, "puma560"), "operator-loss": (operator_loss, OPERATOR_LOSS),
+            "body": (body, ""), "operator-loss": (operator_loss, OPERATOR_LOSS),
             "architecture": (architecture, ARCHITECTURE),
         })  # fmt: skip
     elif robot_token_file is not None:
@@ -190,9 +191,9 @@ def serve(
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
     allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
-    if robot == "ipr":
-        without(robot, {
-            "offset": (offset, "adaptive"), "body": (body, "puma560"), "val-port": (val_port, None),
+    if robot.is_base:
+        without(robot.name, {
+            "offset": (offset, "adaptive"), "body": (body, ""), "val-port": (val_port, None),
             "val-files": (val_files, Path()), "record": (record, None), "recordings": (recordings, RECORDINGS),
         })  # fmt: skip
         room_of(room)
@@ -202,18 +203,21 @@ def serve(
         if camera:
             number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
         serving = MobileServing(
-            host, port, allowed, room, architecture, link, policy, max_age, seed, at, token, until_eof,
+            robot, host, port, allowed, room, architecture, link, policy, max_age, seed, at, token, until_eof,
             one_of("operator-loss", operator_loss, OperatorLoss), jobs, camera,
         )  # fmt: skip
         _advise(advice)
         uvloop.run(serve_mobile(serving, access_for(host, token_file, free=OPEN)))
         return
-    without(robot, {
+    without(robot.name, {
         "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM), "jobs": (jobs, JOBS),
         "operator-loss": (operator_loss, OPERATOR_LOSS), "camera": (camera, CAMERA),
     })  # fmt: skip
+    if not speaks_val(robot):
+        without(robot.name, {"val-port": (val_port, None), "val-files": (val_files, Path())})
     behind = spelled(fixed_offset(offset, profile))
-    options = ["--offset", behind, "--body", body, "--max-age", f"{max_age:g}"]
+    options = ["--robot", name, "--offset", behind, "--max-age", f"{max_age:g}"]
+    options += ["--body", body] if body else []
     recording = None
     told = behind if robot_at is None else OWN, OWN if policy is None else policy.value
     if recordings.exists() and not recordings.is_dir():
@@ -233,6 +237,7 @@ def serve(
     doors = _Doors(host, port, allowed, val_port, val_files, own, until_eof)
     uvloop.run(
         _serve(
+            robot,
             access,
             doors,
             link,
@@ -283,6 +288,7 @@ class _Shelved:
 
 
 async def _serve(
+    arm: Robot,
     access: Access,
     doors: _Doors,
     conditions: LinkConditions,
@@ -319,6 +325,7 @@ async def _serve(
         from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
         from interfaces.station.chain import described
         from interfaces.station.page import Station
+        from interfaces.station.panels import PANELS
         from interfaces.station.record import RecordingFacts, Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -326,23 +333,23 @@ async def _serve(
         from interfaces.val2.pages import PageTerminalServer
         from interfaces.val2.rooms import HOST, ServedVal
         from interfaces.val2.tcp import TcpTerminalServer
-        from robots import puma560
         from robots.onboard.lease import LeaseState
 
-        model = puma560.model()
+        model = arm.arm
         config = LiveOperatorConfig(
-            model, model.poses["nominal"], "", conditions, robot_token, seed,
+            arm, home(model), "", conditions, robot_token, seed,
             server=software(), recording=recording, link_loss=link_loss,
         )  # fmt: skip
         operator = LiveOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
-        station = Station(described(model, operator.scene.tool))
+        panels = tuple(panel for panel in PANELS if speaks_val(arm) or panel.name != "terminal")
+        station = Station(described(model, operator.scene.tool), panels=panels)
         shown = Address(host, port)
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}/ws", doors.own_token, doors.val_files, software())
         terminals = PageTerminalServer(val.enter, access).route
         facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
-        recordings = Recordings(operator, Shelf(shelved.directory), access, facts)
+        recordings = Recordings(operator, Shelf(shelved.directory, arm), access, facts)
         routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
         app = application(routes, doors.allowed(port))
         await stack.enter_async_context(station.running())
@@ -353,7 +360,7 @@ async def _serve(
         keep_quiet()
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
         stack.callback(tidying.cancel)
-        typer.echo(f"vrs: serving {model.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: serving {arm.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()

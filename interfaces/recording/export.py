@@ -23,13 +23,13 @@ from interfaces.recording.track import ESTIMATED, MEASURED
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline
-from vrs.model import Array
+from vrs.model import Array, unit_of
 
 _POSE = "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"
 _POSTURE = "x_m", "y_m", "theta_rad"
 _DRIVE = "v_m_per_s", "w_rad_per_s"
 _STAMPS = "issued_at_s", "asked_at_s", "execute_at_s", "end_s"
-_UNIT = re.compile(r"_((?:s|m|rad|byte)(?:_per_s\d*)?)$")
+_UNIT = re.compile(r"_((?:s|m|rad_or_m|rad|byte)(?:_per_s\d*)?)$")
 _KINDS: dict[type, type] = {kinds.FloatType: float, kinds.IntType: int, kinds.BoolType: bool}
 
 
@@ -82,8 +82,9 @@ def _numbers(names: Iterable[str], values: Array) -> list[TableColumn]:
     return [TableColumn(name, float, column.tolist()) for name, column in zip(names, values.T, strict=True)]
 
 
-def _joints(name: str, q: Array) -> list[TableColumn]:
-    return _numbers((f"{name}{i}_rad" for i in range(1, q.shape[1] + 1)), q)
+def _joints(recording: Recording, name: str, q: Array) -> list[TableColumn]:
+    units = (unit_of(j, recording.prismatic) for j in range(q.shape[1]))
+    return _numbers((f"{name}{i}_{unit}" for i, unit in enumerate(units, start=1)), q)
 
 
 def _tool(recording: Recording, q: Array) -> list[TableColumn]:
@@ -99,7 +100,7 @@ def _tool(recording: Recording, q: Array) -> list[TableColumn]:
 
 
 def _state(recording: Recording, q: Array) -> list[TableColumn]:
-    return _joints("q", q) if recording.kind is ARM else _numbers(_POSTURE, q)
+    return _joints(recording, "q", q) if recording.kind is ARM else _numbers(_POSTURE, q)
 
 
 def _virtual(recording: Recording) -> RecordingTable:
@@ -110,11 +111,12 @@ def _virtual(recording: Recording) -> RecordingTable:
 
 def _real(recording: Recording) -> RecordingTable:
     track = recording.track(recording.kind.real)
+    told = track.reference
     return _table(
         "real",
         _numbers(["t_s", "play_s"], np.stack((track.t, track.play), axis=1)),
         _state(recording, track.q),
-        _joints("reference", track.reference) if recording.kind is ARM else _numbers(_DRIVE, track.reference),
+        _joints(recording, "reference", told) if recording.kind is ARM else _numbers(_DRIVE, told),
         _tool(recording, track.q),
     )
 
@@ -132,7 +134,7 @@ def _commands(recording: Recording) -> RecordingTable:
         _fields(CommandRecord, entries, "number", "at_s"),
         [TableColumn("command", str, [_kind(entry) for entry in entries])],
         _fields(Receipt, receipts, "command_id", "status", *_STAMPS),
-        _joints("q", q.reshape(len(entries), n)),
+        _joints(recording, "q", q.reshape(len(entries), n)),
         [
             TableColumn("refused", bool, [isinstance(one, CommandRecord) and one.refused for one in entries]),
             TableColumn("reason", str, [_reason(entry) for entry in entries]),
@@ -179,7 +181,8 @@ def _segments(recording: Recording) -> RecordingTable:
         for joint, powers in enumerate(segment.coefficients.T.tolist(), start=1)
     ]
     most = max((len(row[-1]) for row in rows), default=1)
-    names = [f"c{k}_rad" + f"_per_s{k if k > 1 else ''}" * (k > 0) for k in range(most)]
+    base = "rad_or_m" if recording.prismatic else "rad"
+    names = [f"c{k}_{base}" + f"_per_s{k if k > 1 else ''}" * (k > 0) for k in range(most)]
     return _table(
         "segments",
         _rows(rows, segment=int, start_s=float, duration_s=float, command_id=int, joint=int),

@@ -210,7 +210,6 @@ class RunFigures:
         recording, begin = self.recording, self.begin
         if recording.kind is not ARM:
             raise FormatError(str(recording.path), "of a mobile robot, which has no joints")
-        model = recording.model
         track = recording.track(REAL)
         t = self._grid(track)
         play, q_real, q_reference = _measured(recording, track, t, self._missing)
@@ -229,7 +228,7 @@ class RunFigures:
             receipts = tuple(r for r in receipts if r.command_id > newest or (r.end or -math.inf) > begin.t)
         answers, messages = recording.receipts("real"), recording.messages()
         return TwinRun(
-            model=model,
+            robot=recording.robot,
             session=begin,
             t=t,
             play=play,

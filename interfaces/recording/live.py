@@ -78,7 +78,7 @@ class _LiveCapture(Capture):
 
     def corrected(self, correction: Correction, truth: Timeline) -> None:
         super().corrected(correction, truth)
-        for event in correction_events([correction]):
+        for event in correction_events([correction], self.model.prismatic):
             self.add(event.t, fields.cut(event))
 
     def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:

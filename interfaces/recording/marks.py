@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -118,7 +118,7 @@ class MarkReader:
         commands, edits, events = recording.commands, recording.edits, recording.events
         left = len(commands) + len(edits) if most is None else most
         for entry in commands[self._commands : self._commands + left]:
-            found += _told(entry)
+            found += _told(entry, self._recording.prismatic)
             self._commands += 1
             left -= 1
         while left > 0 and self._edits < len(edits):
@@ -206,10 +206,10 @@ def _happened(event: RunEvent) -> Iterator[Mark]:
         yield Mark(event.t, kind, event.text)
 
 
-def _told(entry: CommandRecord | Anchor) -> Iterator[Mark]:
+def _told(entry: CommandRecord | Anchor, prismatic: Collection[int]) -> Iterator[Mark]:
     """The mark of a command, or of what put the virtual robot elsewhere."""
     if isinstance(entry, Anchor):
-        text = correction_text(entry.end, np.asarray(entry.error), entry.reason)
+        text = correction_text(entry.end, np.asarray(entry.error), entry.reason, prismatic)
         yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
     elif entry.receipt is not None and not _usual(entry):
         receipt = entry.receipt

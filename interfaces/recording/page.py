@@ -291,7 +291,7 @@ def _recording(track: PlaybackTrack, name: str, growing: bool) -> dict[str, Any]
         "title": session.title,
         "robot": session.robot,
         "kind": recording.kind.word,
-        "unit": recording.kind.unit,
+        "unit": recording.unit,
         "shows": shows(session),
         "driver": session.driver,
         "delay": session.delay,

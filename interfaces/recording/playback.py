@@ -62,8 +62,8 @@ class PlaybackFrame:
     play: float | None
     """The time of the timeline at which the real robot is [s]; of a mobile robot, by the place on the path."""
     error: float | None
-    """Largest difference of a joint between the real robot and g(play) [rad]; of a mobile robot, its path error
-    [m]."""
+    """Largest difference between the real robot and g(play), of a joint that turns [rad]; of a mobile robot, its
+    path error [m]."""
     unit: str = "rad"
     """Of the error."""
 
@@ -95,9 +95,10 @@ class _AtEqualTime(Follower):
 
     @override
     def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """See `Follower`: the largest difference of a joint [rad]."""
-        q = self._recording.virtual(play)
-        return float(np.abs(q_real - q).max()) if np.isfinite(q).all() else None
+        """See `Follower`: the largest difference of a joint that turns [rad]; where none does, of any [m]."""
+        q, prismatic = self._recording.virtual(play), self._recording.prismatic
+        some = slice(None) if len(prismatic) in (0, len(q)) else [j for j in range(len(q)) if j not in prismatic]
+        return float(np.abs(q_real - q)[some].max()) if np.isfinite(q).all() else None
 
 
 class PlaybackTrack:
@@ -143,7 +144,7 @@ class PlaybackTrack:
         """What is there at a time of the play-back [s]."""
         own = t - self.shift
         recording = self.recording
-        unit = recording.kind.unit
+        unit = recording.unit
         q_virtual = self._known(recording.virtual, own)
         q_real = self._known(recording.real, own)
         if q_real is None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +13,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from typing_extensions import override
 
 from interfaces.messages.recording import (
     Anchor,
@@ -33,6 +32,7 @@ from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
+from robots.robot import Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Known, Receipt
 from vrs.model import Array, frozen_array
@@ -73,26 +73,17 @@ def shows(begin: Begin) -> list[str]:
     return ["driven"] if begin.drive.grid is None else ["driven", "learned"]
 
 
-def _model(begin: Begin) -> Any:
-    """The model of a robot that is known here; None of any other."""
-    if begin.drive is None:
-        from robots import puma560
-
-        model = puma560.model()
-        return model if begin.robot == "puma560" and len(begin.q) == model.limits.dof else None
-    from robots import ipr
-
-    body = "micro" if begin.drive.body == "micro" else "ipr"
-    return ipr.model(body, period=begin.drive.period) if begin.robot == "ipr" and len(begin.q) == POSTURE else None
-
-
-def open_recording(path: Path | str) -> Recording:
+def open_recording(path: Path | str, robot: Robot | None = None) -> Recording:
     """Open a recording, complete, cut, damaged or still being written.
+
+    Args:
+        path: The file.
+        robot: What it may be of, if it has that name; else the robot is found by its name.
 
     Raises:
         FormatError: If it's none, or if what it begins with is destroyed.
     """
-    return Recording(Path(path))
+    return Recording(Path(path), robot)
 
 
 class Recording:
@@ -101,9 +92,8 @@ class Recording:
     What is missing stands in `damage`; nothing is made up for it.
     """
 
-    @override
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, robot: Robot | None = None) -> None:
+        self.path, self._robot = path, robot
         self._source = FileSource(path)
         try:
             self._blocks = Blocks(self._source)
@@ -121,7 +111,6 @@ class Recording:
             told = len(begin.q) if begin.drive is None else 2
             self._tracks = Tracks(self._blocks, len(begin.q), told, str(path))
             self._chain, self._applied = Chain(str(path)), 0
-            self._model: Any = None
         except FormatError:
             self._source.close()
             raise
@@ -186,17 +175,50 @@ class Recording:
         return found
 
     @property
-    def model(self) -> Any:
-        """The robot's model: a `RobotModel`, or an `Ipr`.
+    def robot(self) -> Robot:
+        """The robot that it's of.
 
         Raises:
             FormatError: If it's none that is known here, or has other joints.
         """
-        if self._model is None:
-            self._model = _model(self.session)
-            if self._model is None:
-                raise FormatError(str(self.path), f"of a robot that isn't known here: {self.session.robot!r}")
-        return self._model
+        begin = self.session
+        # Mobile robots of one family have its name, and a body of their own.
+        own = begin.drive is not None and begin.drive.body in names()
+        name = begin.drive.body if own and begin.drive is not None else begin.robot
+        robot = self._robot
+        if (robot is None or robot.name != name) and name in names():
+            robot = self._robot = load(name)
+        if robot is None or robot.name != name:
+            raise FormatError(
+                str(self.path), f"of a robot that isn't known here: {name!r}; --robot says where it is"
+            )
+        numbers = POSTURE if begin.drive is not None else robot.arm.limits.dof
+        if len(begin.q) != numbers:
+            raise FormatError(str(self.path), f"of a {name!r} with {len(begin.q)} numbers to say where it is")
+        return robot
+
+    @property
+    def model(self) -> Any:
+        """The robot's model: a `RobotModel`, or a `MobileBase` with the period of its run.
+
+        Raises:
+            FormatError: If it's none that is known here.
+        """
+        drive = self.session.drive
+        return self.robot.arm if drive is None else replace(self.robot.base, period=drive.period)
+
+    @property
+    def prismatic(self) -> Collection[int]:
+        """Joints that are, from 0; none where the robot has none, or isn't known."""
+        try:
+            return () if self.session.drive is not None else self.model.prismatic
+        except FormatError:
+            return ()
+
+    @property
+    def unit(self) -> str:
+        """Of how far the real robot is from the virtual one: `rad`, or `m` of an arm without a joint that turns."""
+        return "m" if len(self.prismatic) == len(self.session.q) else self.kind.unit
 
     @property
     def span(self) -> tuple[float, float]:

@@ -273,7 +273,7 @@ class DriveRecorder(Witness):
         named = case.architecture, case.transport.value, case.delay, case.robot, case.operator
         return Begin(
             t=0.0,
-            robot="ipr",
+            robot=case.real[0].base.name,
             driver="laboratory",
             title=text(f"{', '.join(named)}, seed {case.seed}"),
             seed=case.seed,

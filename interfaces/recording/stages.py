@@ -7,7 +7,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from interfaces.clients.appearance import link_shapes
 from interfaces.messages.recording import grid_of, room_of
 from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import ARM, Recording
@@ -30,7 +29,7 @@ class DriveStage:
         Raises:
             FormatError: If the room makes no sense.
         """
-        self._recording, facts, model = recording, recording.session.drive, recording.model
+        self._recording, facts, robot = recording, recording.session.drive, recording.robot
         self._until = -np.inf
         self._t: Array = np.empty(0)
         self._paths: dict[str, Array] = {}
@@ -39,9 +38,9 @@ class DriveStage:
         room = None if entry is None else room_of(entry, str(recording.path))
         grid = None if facts is None or facts.grid is None else grid_of(facts.grid)
         self._learned_at, self._learned = _learned(recording)
-        extent = self._extent(recording.session.q, MARGIN * model.body.length)
-        start, looks = recording.session.q, bodies(model)
-        self.scene = TwinScene(model, start, looks=looks, room=room, grid=grid, extent=extent)
+        extent = self._extent(recording.session.q, MARGIN * robot.base.body.length)
+        start, looks = recording.session.q, bodies(robot)
+        self.scene = TwinScene(robot, start, looks=looks, room=room, grid=grid, extent=extent)
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -99,7 +98,7 @@ class ArmStage:
     """Two arms."""
 
     def __init__(self, recording: Recording) -> None:
-        self.scene = TwinScene(recording.model, looks=bodies(recording.model))
+        self.scene = TwinScene(recording.robot, looks=bodies(recording.robot))
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -119,4 +118,4 @@ def stage_of(recording: Recording) -> Stage:
 def prepare(recording: Recording) -> None:
     """Read and load what takes long before a recording can be shown; from any thread."""
     q = recording.virtual(recording.span[0])
-    recording.model.links(q) if recording.kind is ARM else link_shapes(recording.model)
+    recording.model.links(q) if recording.kind is ARM else recording.robot.shapes()

@@ -47,7 +47,7 @@ def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> 
 def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
     """Return the report as one HTML text."""
     viewer, licences = viewer_bundle()
-    drawn = plots(run)
+    drawn, data = plots(run), scene(run)
     return Template(_asset("report.html")).substitute(
         title=escape(run.session.title or "Twin run"),
         css=_asset("report.css"),
@@ -59,9 +59,9 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
         receipts=receipts("Virtual robot", run.receipts_virtual) + receipts("Real robot", run.receipts_real),
         events=_events(run),
         licences=escape(licences),
-        data=_script_json(scene(run)),
+        data=_script_json(data),
         viewer=_script(viewer),
-        script=_script(_asset("report.js")),
+        script=_script(_page_script(data)),
     )
 
 
@@ -111,6 +111,17 @@ def _events(run: TwinRun) -> str:
 
 def _asset(name: str) -> str:
     return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _page_script(data: Mapping[str, Any]) -> str:
+    """The page's script; where the chain is one of screws, with the station's `Chain` for its own kinematics."""
+    text = _asset("report.js")
+    if "home" not in data:
+        return text
+    chain = resources.files("interfaces.station").joinpath("static/chain.js").read_text(encoding="utf-8")
+    own, following = text.index("  // Column-major products"), text.index("  // Corner normals")
+    links = "  const links = (q) => new Chain({ home: run.home, screws: run.chain }).links(q);\n\n"
+    return chain.replace("export ", "") + text[:own] + links + text[following:]
 
 
 def _script_json(value: object) -> str:

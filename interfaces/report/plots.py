@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -65,8 +65,10 @@ class Plot:
 
 def plots(run: TwinRun) -> tuple[Plot, ...]:
     """Draw how far behind the real robot was, joint errors, tool error, and the trajectory of every joint."""
-    error = np.degrees(run.q_real - run.q_matched)
-    n = error.shape[1]
+    prismatic = run.model.prismatic
+    error = run.q_real - run.q_matched
+    turning = [j for j in range(error.shape[1]) if j not in prismatic]
+    sliding = [j for j in range(error.shape[1]) if j in prismatic]
     same = "Control: real minus virtual at the same place in the plan, when the real robot was there."
     out = [
         _plot(
@@ -79,7 +81,14 @@ def plots(run: TwinRun) -> tuple[Plot, ...]:
             "arrival, or at the upper edge if it's longer. Where messages "
             "were late the robot slowed down, and was further behind from there on.",
         ),
-        _plot(run, "joint-errors", "Joint errors", "deg", lambda ax: _lines(ax, run.t, error), note=same),
+        *(
+            _plot(run, name, title, unit, partial(_lines, t=run.t, values=scale * error, joints=joints), note=same)
+            for name, title, unit, scale, joints in (
+                ("joint-errors", "Joint errors", "deg", 180.0 / np.pi, turning),
+                ("prismatic-errors", "Errors of prismatic joints", "mm", 1e3, sliding),
+            )
+            if joints
+        ),
         _plot(run, "tool-error", "Tool error", "mm", lambda ax: _tool_error(ax, run), note=same),
     ]
     out.extend(
@@ -87,12 +96,12 @@ def plots(run: TwinRun) -> tuple[Plot, ...]:
             run,
             f"joint-{j + 1}",
             f"Joint {j + 1}",
-            "deg",
+            "m" if j in prismatic else "deg",
             partial(_trajectory, run=run, j=j),
             size=(4.6, 2.3),
             is_joint=True,
         )
-        for j in range(n)
+        for j in range(error.shape[1])
     )
     return tuple(out)
 
@@ -106,10 +115,10 @@ def _tool_error(ax: Axes, run: TwinRun) -> None:
     ax.set_ylim(bottom=0.0)
 
 
-def _lines(ax: Axes, t: Array, values: Array) -> None:
-    for j, column in enumerate(values.T):
-        ax.plot(*_thin(t, column), color=JOINTS[j % len(JOINTS)], linewidth=1.3, label=f"{j + 1}")
-    _legend(ax, columns=values.shape[1])
+def _lines(ax: Axes, *, t: Array, values: Array, joints: Sequence[int]) -> None:
+    for j in joints:
+        ax.plot(*_thin(t, values[:, j]), color=JOINTS[j % len(JOINTS)], linewidth=1.3, label=f"{j + 1}")
+    _legend(ax, columns=len(joints))
 
 
 def _behind(ax: Axes, run: TwinRun) -> None:
@@ -130,8 +139,9 @@ def _behind(ax: Axes, run: TwinRun) -> None:
 
 
 def _trajectory(ax: Axes, *, run: TwinRun, j: int) -> None:
-    ax.plot(*_thin(run.t, np.degrees(run.q_shown[:, j])), color=VIRTUAL, linewidth=1.3, label="virtual")
-    ax.plot(*_thin(run.t, np.degrees(run.q_real[:, j])), color=REAL, linewidth=1.3, label="real")
+    for q, colour, label in ((run.q_shown, VIRTUAL, "virtual"), (run.q_real, REAL, "real")):
+        values = q[:, j] if j in run.model.prismatic else np.degrees(q[:, j])
+        ax.plot(*_thin(run.t, values), color=colour, linewidth=1.3, label=label)
     _legend(ax, columns=2)
 
 

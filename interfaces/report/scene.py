@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.clients.appearance import link_shapes
 from interfaces.runs.twin_run import TwinRun
-from vrs.errors import InvalidValueError
+from interfaces.station.chain import screws
 from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
-    from robots.puma560.shapes import LinkShape
+    from robots.solids import LinkShape
 
 MAX_SAMPLES: Final = 24_000
 """Most samples of a twin that a page carries; longer runs are thinned."""
 
+_THICK: Final = 0.02
+"""Half of the thickness of a knob [m]."""
 Json = dict[str, Any]
 
 
@@ -27,22 +29,20 @@ def scene(run: TwinRun) -> Json:
     """Describe both twins for the viewer.
 
     Returns:
-        A JSON value: `links` (meshes in link frames), `base` and `chain` (constant transforms, column-major),
-        `t`, `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
+        A JSON value: `links` (meshes in link frames), the chain (see `chain_of`), `t`,
+         `q_virtual`, `q_real` (NaN where nothing was measured), `behind` (−D; base64 of little-endian
         float32), `floor`, `box` and `markers`.
 
     Raises:
-        InvalidValueError: If the model isn't a chain of revolute joints in standard Denavit-Hartenberg frames.
+        InvalidValueError: If the model isn't a chain of revolute and prismatic joints.
     """
     stride = max(1, -(-len(run.t) // MAX_SAMPLES))
-    base, chain = revolute_chain(run.model)
-    shapes = link_shapes(run.model)
-    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=-0.7)
+    shapes = run.robot.shapes() or rods(run.model)
+    floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
     low, high = _box(run, floor)
     return {
         "links": [_mesh(shape) for shape in shapes],
-        "base": _column_major(base),
-        "chain": [_column_major(X) for X in chain],
+        **chain_of(run.model),
         "t": _packed(run.t[::stride] - run.t[0]),
         "t_start": float(run.t[0]),
         "t_end": float(run.t[::stride][-1]),
@@ -55,14 +55,15 @@ def scene(run: TwinRun) -> Json:
     }
 
 
-def revolute_chain(model: RobotModel) -> tuple[Array, Array]:
-    """Split a model's kinematics into constants, so that X_i = X_(i-1) Rz(q_i) A_i.
+def chain_of(model: RobotModel) -> Json:
+    """A model's kinematics, as the page's script takes them.
 
     Returns:
-        The base pose, (4, 4), and A, (n, 4, 4).
+        `base` and `chain`, constant transforms, column-major, so that X_i = X_(i-1) Rz(q_i) A_i; where the model
+        doesn't move so, `home` and `chain` from `interfaces.station.chain.screws`.
 
     Raises:
-        InvalidValueError: If the model's links don't move so.
+        InvalidValueError: If the model isn't a chain of revolute and prismatic joints.
     """
     n = model.limits.dof
     rest = np.asarray(model.links(np.zeros(n)))
@@ -74,8 +75,29 @@ def revolute_chain(model: RobotModel) -> tuple[Array, Array]:
         turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         X = X @ turn @ A[i]
         if not np.allclose(X, np.asarray(model.links(q))[i + 1], atol=1e-9):
-            raise InvalidValueError("model", model.name, "a chain of revolute joints about their z axes")
-    return rest[0], A
+            home, S = screws(model)
+            return {"home": [_column_major(X) for X in home], "chain": S.tolist()}
+    return {"base": _column_major(rest[0]), "chain": [_column_major(X) for X in A]}
+
+
+def rods(model: RobotModel) -> tuple[LinkShape, ...]:
+    """What an arm without shapes is drawn as: a knob a link, a rod from the one before where that's constant."""
+    from robots.solids import Builder, hull
+
+    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
+    corners = _THICK * np.array(list(product((-1.0, 1.0), repeat=3)))
+    found = []
+    for i in range(model.limits.dof + 1):
+        build = Builder(f"link {i}", (0.62, 0.64, 0.67))
+        build.add(hull(corners))
+        if i:
+            one, other = (
+                (np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span))
+            )
+            if np.allclose(one, other, atol=1e-9) and np.linalg.norm(one) > _THICK:
+                build.add(hull(np.vstack([0.4 * corners, one + 0.4 * corners])))
+        found.append(build.shape())
+    return tuple(found)
 
 
 def markers(run: TwinRun) -> list[Json]:

@@ -53,7 +53,8 @@ def error_table(summary: Summary) -> Table:
         title=f"Virtual and real {summary['robot']}, delay {summary['delay']}, offset {summary['offset']}",
         title_justify="left",
     )
-    for name in ("at equal", "joint", "rms\ndeg", "max\ndeg"):
+    mixed = "joint_rms_m" in summary["errors"]["timeline_time"]
+    for name in ("at equal", "joint", *(("rms", "max") if mixed else ("rms\ndeg", "max\ndeg"))):
         table.add_column(name, justify="left" if name == "at equal" else "right")
     for name in ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg"):
         table.add_column(name, justify="right")
@@ -63,14 +64,21 @@ def error_table(summary: Summary) -> Table:
         table.add_row(
             label,
             str(joint),
-            f"{row['joint_rms_deg'][joint - 1]:.3f}",
-            f"{row['joint_max_deg'][joint - 1]:.3f}",
+            *(_of_joint(row, name, joint, mixed=mixed) for name in ("joint_rms", "joint_max")),
             f"{1e3 * row['tool_rms_m']:.2f}",
             f"{1e3 * row['tool_max_m']:.2f}",
             f"{row['angle_rms_deg']:.3f}",
             f"{row['angle_max_deg']:.3f}",
         )
     return table
+
+
+def _of_joint(row: Summary, name: str, joint: int, *, mixed: bool) -> str:
+    """A figure of a joint, counted from 1, with its unit where joints have different ones."""
+    angle = row[f"{name}_deg"][joint - 1]
+    if angle is None:
+        return f"{1e3 * row[f'{name}_m'][joint - 1]:.2f} mm"
+    return f"{angle:.3f} deg" if mixed else f"{angle:.3f}"
 
 
 def attribution_table(summary: Summary) -> Table:
@@ -249,7 +257,7 @@ def tiles(summary: Json) -> str:
     timeline = _part(_part(summary, "errors"), "timeline_time")
     user = _part(_part(summary, "errors"), "user_time")
     path, commands = _part(summary, "path"), _part(summary, "commands")
-    joint_rms = timeline.get("joint_rms_deg") or [None]
+    joint_rms = [x for x in timeline.get("joint_rms_deg") or () if x is not None] or [None]
     late, lost, behind = commands.get("late"), commands.get("lost"), _part(summary, "behind")
     shares = [behind.get("mean_s"), summary.get("lag_timeline_s")]
     played = None if None in shares else " + ".join(map(_number, shares))

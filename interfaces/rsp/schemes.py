@@ -85,7 +85,7 @@ _UP: Final = struct.Struct("!Iddd")
 FIXED_DOWN: Final = 1992
 """Size of a packet of one size to the robot [byte]: the paper's largest."""
 FIXED_UP: Final = 96
-"""And from it [byte]: all of CUBO's sensors."""
+"""And from it [byte]: all of a thin client's sensors."""
 
 
 class PlainLocal(LocalEnd):

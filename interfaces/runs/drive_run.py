@@ -14,13 +14,14 @@ from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
-from robots.onboard.driving import IPR_LIMITS, Posture
+from robots.onboard.driving import Posture
+from robots.robot import USUAL_BASE, Robot, load
 from vrs.checks import one_of, validated, within
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array
 
-ROBOTS = ("ipr", "micro", "bare")
-"""Real robots by name: the paper's two in PyBullet, and the bare kinematic one."""
+BARE = "bare"
+"""Name of the usual mobile robot with its bare kinematic body."""
 DriveLink: TypeAlias = Link[ArcPacket, ArchitectureReport]
 """What is between both sites."""
 
@@ -34,8 +35,8 @@ class DriveCase:
     transport: Transport = Transport.DATAGRAMS
     delay: str = "mon"
     """Profile of either direction, as the command line spells it."""
-    robot: str = "ipr"
-    """`ipr`, `micro` (PyBullet) or `bare`."""
+    robot: str = USUAL_BASE
+    """A mobile robot, as `robots.load` finds it, or `bare`."""
     operator: str = "mixed"
     seed: int = 0
     length: Annotated[float, within(1.0, 3600.0, "s")] = 120.0
@@ -44,7 +45,7 @@ class DriveCase:
     reality: MobileReality | None = None
     """Of the real robot; all of it unless given."""
     room: str | Room = ""
-    """Where it drives, a room or a name of `robots.ipr.robot.PLACES`; the operator's own unless given."""
+    """Where it drives, a room or one that comes with the package; the operator's own unless given."""
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""
@@ -54,9 +55,19 @@ class DriveCase:
         """Architecture, transport, delay, robot and operator: what it's one of several seeds of."""
         return self.architecture, self.transport.value, self.delay, self.robot, self.operator
 
+    @property
+    def real(self) -> tuple[Robot, str]:
+        """The real robot, and the name of its body; empty for the usual one.
+
+        Raises:
+            InvalidValueError: If there's no such robot.
+            FormatError: If its module can't be imported.
+        """
+        return (load(USUAL_BASE), BARE) if self.robot == BARE else (load(self.robot), "")
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
-        one_of("robot", self.robot, ROBOTS)
+        self.real[0].base  # noqa: B018 - raises where it's none
         one_of("position", self.position, POSITIONS)
         if isinstance(self.room, str):
             one_of("room", self.room, ("", *PLACES))
@@ -98,7 +109,7 @@ class DriveRun:
 
     def limits_passed(self) -> int:
         """How many drives were beyond the robot's limits of speed and acceleration."""
-        limits, slack = IPR_LIMITS, 1 + 1e-9
+        limits, slack = self.case.real[0].base.limits, 1 + 1e-9
         v, w = self.drives.T
         rise = np.abs(np.diff(v, prepend=0.0)) > limits.a_max * CONTROL * slack + 1e-12
         return int(np.sum(rise | (np.abs(v) > limits.v_max * slack) | (np.abs(w) > limits.w_max * slack)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from interfaces.runs.twin_run import TwinRun
 from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
 from vrs.ledger import Receipt, Status
-from vrs.model import Array
+from vrs.model import Array, RobotModel
 
 CAUSES = ("network", "payload_and_friction", "servo")
 """The order in which causes are switched off; each stays off in the runs after it."""
@@ -27,7 +28,7 @@ class Measures:
     tool_rms_user_m: float
     """Tool distance at equal user time, rms [m]."""
     joint_rms_timeline_rad: float
-    """Joint error at equal timeline time, rms over all joints [rad]."""
+    """Joint error at equal timeline time, rms over all joints that turn [rad]; 0 where none does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,9 @@ def measures(run: TwinRun) -> Measures:
     """Measure one run."""
     timeline = agreement(run.model, run.q_matched, run.q_real)
     user = agreement(run.model, run.q_shown, run.q_real)
-    return Measures(timeline.tool_rms, user.tool_rms, float(np.sqrt(np.mean(timeline.joint_rms**2))))
+    turning = np.delete(timeline.joint_rms, list(run.model.prismatic))
+    joints = float(np.sqrt(np.mean(turning**2))) if len(turning) else 0.0
+    return Measures(timeline.tool_rms, user.tool_rms, joints)
 
 
 def attribute(stages: tuple[Measures, ...]) -> tuple[Attribution, ...]:
@@ -134,7 +137,7 @@ def summarize(
         "duration_s": float(run.t[-1]),
         "gap_s": run.gap_s,
         "commands": _commands(run),
-        "errors": {name: _errors(value) for name, value in errors.items()},
+        "errors": {name: _errors(value, run.model) for name, value in errors.items()},
         "lag_timeline_s": lag,
         "lag_user_s": None if lag is None else lag - D,
         "path": _path(run),
@@ -145,13 +148,13 @@ def summarize(
             {
                 "t_s": made.t,
                 "end_s": made.end,
-                "error_deg": _degrees(made.error),
+                **in_units("error", made.error, run.model.prismatic),
                 "reason": made.reason,
             }
             for made in run.corrections
         ],
-        "receipts_virtual": [_receipt(receipt) for receipt in run.receipts_virtual],
-        "receipts_real": [_receipt(receipt) for receipt in run.receipts_real],
+        "receipts_virtual": [_receipt(receipt, run.model) for receipt in run.receipts_virtual],
+        "receipts_real": [_receipt(receipt, run.model) for receipt in run.receipts_real],
         "packets": [
             {
                 "command_id": packet.command_id,
@@ -219,11 +222,13 @@ def _messages(run: TwinRun) -> Json:
     }
 
 
-def _errors(value: Agreement) -> Json:
-    worst = int(np.argmax(value.joint_rms))
+def _errors(value: Agreement, model: RobotModel) -> Json:
+    # Metres and radians don't compare; shares of what a joint can do, do.
+    span = model.limits.q_max - model.limits.q_min if model.prismatic else 1.0
+    worst = int(np.argmax(value.joint_rms / span))
     return {
-        "joint_rms_deg": np.degrees(value.joint_rms).tolist(),
-        "joint_max_deg": np.degrees(value.joint_max).tolist(),
+        **in_units("joint_rms", value.joint_rms, model.prismatic),
+        **in_units("joint_max", value.joint_max, model.prismatic),
         "worst_joint": worst + 1,
         "tool_rms_m": value.tool_rms,
         "tool_max_m": value.tool_max,
@@ -258,7 +263,7 @@ def _attribution(item: Attribution) -> Json:
     }
 
 
-def _receipt(receipt: Receipt) -> Json:
+def _receipt(receipt: Receipt, model: RobotModel) -> Json:
     return {
         "command_id": receipt.command_id,
         "status": str(receipt.status),
@@ -266,7 +271,7 @@ def _receipt(receipt: Receipt) -> Json:
         "asked_at_s": receipt.asked_at,
         "execute_at_s": receipt.execute_at,
         "end_s": receipt.end,
-        "q_deg": None if receipt.q is None else _degrees(receipt.q),
+        **in_units("q", receipt.q, model.prismatic),
         "reason": receipt.reason,
         "shifted": list(receipt.shifted),
         "shift_s": receipt.shift,
@@ -275,8 +280,16 @@ def _receipt(receipt: Receipt) -> Json:
     }
 
 
-def _degrees(q: Array) -> list[float]:
-    return [float(angle) for angle in np.degrees(q)]
+def in_units(name: str, values: Array | None, prismatic: Collection[int]) -> Json:
+    """A number a joint in degrees, by its name and unit; where some joints are prismatic, another list in metres.
+
+    Either list has None for the other's joints.
+    """
+    if values is None:
+        return {f"{name}_deg": None}
+    turning = [None if j in prismatic else float(x) for j, x in enumerate(np.degrees(values))]
+    moving = [float(x) if j in prismatic else None for j, x in enumerate(values)]
+    return {f"{name}_deg": turning, **({f"{name}_m": moving} if prismatic else {})}
 
 
 def _rounded(value: Any) -> Any:

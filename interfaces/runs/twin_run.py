@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -15,13 +15,14 @@ from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
 from interfaces.link.delays import MAX_DELAY
 from interfaces.messages.recording import Begin, CommandPacket, RunEvent
 from interfaces.teleop import Correction, OperatorSite
+from robots.robot import Robot
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
 from vrs.comparison import measured_rows
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, VrsError
 from vrs.ledger import Receipt, Status
-from vrs.model import Array, RobotModel, frozen_array
+from vrs.model import Array, RobotModel, for_people, frozen_array
 from vrs.timeline import Timeline
 
 QUANTILE = 0.95
@@ -94,8 +95,8 @@ class TwinRun:
     Equal timeline time compares the real robot at t with the virtual one at p(t).
     """
 
-    model: RobotModel
-    """The robot that both twins are."""
+    robot: Robot
+    """The arm that both twins are."""
     session: Begin
     """How it was set up."""
     t: Array
@@ -144,6 +145,11 @@ class TwinRun:
             if value.ndim != 2 or len(value) != len(self.t):
                 raise InvalidValueError(name, value.shape, f"of shape ({len(self.t)}, n)")
             object.__setattr__(self, name, value)
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm's kinematics and limits."""
+        return self.robot.arm
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -273,23 +279,24 @@ def waits(t: Array, play: Array, q_reference: Array, *, slowest: float) -> Itera
         yield RunEvent(float(t[low]), "slowed" if moving else "waited", text)
 
 
-def correction_events(corrections: Sequence[Correction]) -> Iterator[RunEvent]:
+def correction_events(corrections: Sequence[Correction], prismatic: Collection[int]) -> Iterator[RunEvent]:
     """Tell when the virtual robot was put where the real one was going."""
     for made in corrections:
-        yield RunEvent(made.t, "corrected", correction_text(made.end, made.error, made.reason))
+        yield RunEvent(made.t, "corrected", correction_text(made.end, made.error, made.reason, prismatic))
 
 
-def correction_text(end: float, error: Array, reason: str) -> str:
+def correction_text(end: float, error: Array, reason: str, prismatic: Collection[int]) -> str:
     """Say that the virtual robot was put where the real one was going.
 
     Args:
         end: Until when it took [s].
-        error: By how much it was off [rad], (n,).
+        error: By how much it was off [rad], of prismatic joints [m], (n,).
         reason: Why.
+        prismatic: Which joints are, from 0.
     """
     joint = int(np.abs(error).argmax())
-    off = float(np.degrees(np.abs(error[joint])))
-    where = f"joint {joint + 1} was {off:.3g}° off"
+    off, unit = for_people(joint, abs(float(error[joint])), prismatic)
+    where = f"joint {joint + 1} was {off:.3g}{'°' if unit == 'deg' else f' {unit}'} off"
     return f"the virtual robot joined the real one's plan until {end:.2f} s ({where}): {reason}"
 
 

@@ -16,6 +16,7 @@ from interfaces.messages.sites import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import JointReference, RobotSite
 from robots.onboard.playout import PlayState
+from robots.robot import ArmBody
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
@@ -75,13 +76,6 @@ Action: TypeAlias = Callable[[float], None]
 """What is done at a time, which it's told [s]."""
 
 
-class RobotBody(Protocol):
-    """What follows references, a row a tick."""
-
-    def follow(self, reference: JointReference) -> Array:
-        """Follow references for a tick each; return measured joints after each, (m, n) [rad]."""
-
-
 class Laboratory:
     """An operator's site, a robot's site and the link between them under one virtual clock.
 
@@ -98,7 +92,7 @@ class Laboratory:
         now: float = 0.0,
         tick: float = 0.02,
         every: int = 1,
-        body: RobotBody | None = None,
+        body: ArmBody | None = None,
     ) -> None:
         """Put everything in its place.
 
@@ -209,7 +203,7 @@ class Laboratory:
         self._play.append(np.column_stack((t[rows], *(column[rows] for column in play))))
         if self._body is not None:
             reference = self.robot.reference(play)
-            measured = self._body.follow(reference)
+            measured = self._body.follow(self._body.prepare(*reference)).q
             self._followed.append(JointReference(*(column[rows].copy() for column in reference)))
             self._measured.append(measured[rows].copy())
             self.robot.measured(measured[-1], now=float(t[-1]))

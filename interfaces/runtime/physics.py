@@ -20,7 +20,6 @@ from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,
     Attach,
-    BodyKind,
     Close,
     Fault,
     Measurement,
@@ -35,11 +34,12 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.system import module_process
 from interfaces.teleop import JointReference, RobotHost
+from robots.robot import EXACT, Robot
 from vrs.checks import number_in, validated, within
 from vrs.clock import WallClock
 from vrs.commands import finite_array
 from vrs.errors import InvalidValueError, VrsError
-from vrs.model import Array, Limits
+from vrs.model import Array
 
 TICK = 0.001
 """Length of a tick [s]."""
@@ -67,23 +67,26 @@ _READS_MOST = 1024
 class PhysicsConfig:
     """Which body, and where it stands."""
 
-    limits: Limits
-    """The robot's."""
+    robot: Robot
+    """Whose; found by `robots.load`, unless the body is exact."""
     q: Array
-    """Where it stands [rad], (n,), within the limits."""
-    body: BodyKind = BodyKind.PUMA560
-    """Which one."""
+    """Where it stands [rad], of prismatic joints [m], (n,), within the limits."""
+    body: str = ""
+    """Which of its bodies; the usual one unless given."""
     friction: bool = True
     """Whether its joints have friction."""
     every: Annotated[int, within(1, 1000)] = 10
     """Ticks from one report to the next, in [1, 1000]."""
 
     def __post_init__(self) -> None:
-        n = self.limits.dof
-        q = finite_array("q", self.q, (n,), f"finite joint values [rad], shape ({n},)")
-        self.limits.check(q)
+        limits = self.robot.arm.limits
+        q = finite_array("q", self.q, (limits.dof,), f"finite joint values [rad], shape ({limits.dof},)")
+        limits.check(q, self.robot.arm.prismatic)
         object.__setattr__(self, "q", q)
-        object.__setattr__(self, "body", BodyKind(self.body))
+        object.__setattr__(self, "body", self.body or self.robot.usual_body)
+        self.robot.body(self.body)
+        if self.body != EXACT and not self.robot.found_by:
+            raise InvalidValueError("robot", self.robot.name, "one that robots.load finds, as its process does")
         if isinstance(self.every, bool) or not isinstance(self.every, int):
             raise InvalidValueError("every", self.every, "a whole number in [1, 1000]")
 
@@ -131,7 +134,8 @@ class PhysicsProcess:
         Raises:
             PhysicsStartError: If it can't be started.
         """
-        self._n, self._run = config.limits.dof, 0
+        limits = config.robot.arm.limits
+        self._n, self._run = limits.dof, 0
         self._heard, self._ready, self._silent = clock.now(), False, False
         self._ended: ProcessEnded | None = None
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -154,12 +158,12 @@ class PhysicsProcess:
         finally:
             theirs.close()
         ours.setblocking(False)
-        limits = config.limits
         bounds = (limits.q_min, limits.q_max, limits.qd_max, limits.qdd_max, limits.qddd_max)
         self._send(
             PhysicsSetup(
-                config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
+                config.robot.found_by, config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
                 tuple(config.q.tolist()), tuple(tuple(bound.tolist()) for bound in bounds),  # type: ignore[arg-type]
+                tuple(config.robot.arm.prismatic),
             )
         )  # fmt: skip
 

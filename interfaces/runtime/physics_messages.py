@@ -27,15 +27,6 @@ Row: TypeAlias = tuple[float, ...]
 """A number a joint."""
 
 
-class BodyKind(StrEnum):
-    """Which body the process runs."""
-
-    EXACT = "exact"
-    """It is where its reference is."""
-    PUMA560 = "puma560"
-    """The PyBullet PUMA 560."""
-
-
 class FaultKind(StrEnum):
     """Why the body came to rest by itself."""
 
@@ -65,7 +56,10 @@ class PhysicsActivity(StrEnum):
 class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     """The first message to the process."""
 
-    body: BodyKind
+    robot: str
+    """What `robots.load` finds it by; nothing is looked up for a body that's exact."""
+    body: str
+    """Which of its bodies."""
     friction: bool
     tick: float
     """Length of a tick [s]."""
@@ -78,7 +72,9 @@ class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     q: Row
     """Where the body stands [rad]."""
     limits: tuple[Row, Row, Row, Row, Row]
-    """q_min, q_max [rad], qd_max [rad/s], qdd_max [rad/s²], qddd_max [rad/s³]."""
+    """q_min, q_max [rad], qd_max [rad/s], qdd_max [rad/s²], qddd_max [rad/s³]; of prismatic joints in m for rad."""
+    prismatic: tuple[int, ...] = ()
+    """Which are, from 0."""
 
     def joint_limits(self) -> Limits:
         """The limits as a value."""

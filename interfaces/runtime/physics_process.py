@@ -13,11 +13,9 @@ import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
-    BodyKind,
     Measurement,
     News,
     PhysicsSetup,
@@ -26,12 +24,10 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.runtime.tick_loop import Moved, TickBody, TickLoop
 from interfaces.system import hasten
+from robots.robot import EXACT, ArmBody, Prepared, exact_arm, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError
 from vrs.model import Array
-
-if TYPE_CHECKING:
-    from robots.puma560.body import Prepared, RealArm
 
 _SETUP_TIME = 10.0
 """How long to wait for the first message [s]."""
@@ -43,29 +39,10 @@ _UNSENT_MOST = 64
 """Most messages that wait until the parent reads."""
 
 
-class ExactTicks:
-    """A body that is where its reference is."""
+class BodyTicks:
+    """An arm's body, a tick at a time."""
 
-    def prepare(self, rows: Array) -> list[Moved]:
-        """Say where each reference is."""
-        q, qd, _ = rows.transpose(1, 0, 2).tolist()
-        return [Moved(x, v, ()) for x, v in zip(q, qd, strict=True)]
-
-    def step(self, prepared: Moved) -> Moved:
-        """Go there."""
-        return prepared
-
-    def attach(self, mass: float) -> None:
-        """Take a load, which changes nothing."""
-
-    def release(self) -> None:
-        """Drop the load, which changes nothing."""
-
-
-class PumaTicks:
-    """The PyBullet PUMA 560, a tick at a time."""
-
-    def __init__(self, arm: RealArm) -> None:
+    def __init__(self, arm: ArmBody) -> None:
         self.arm = arm
 
     def prepare(self, rows: Array) -> Sequence[Prepared]:
@@ -80,9 +57,7 @@ class PumaTicks:
 
     def attach(self, mass: float) -> None:
         """Take a load that the servo doesn't know."""
-        from robots.bullet import Payload
-
-        self.arm.attach(Payload(mass=mass))
+        self.arm.attach(mass)
 
     def release(self) -> None:
         """Drop the load."""
@@ -92,14 +67,9 @@ class PumaTicks:
 @contextmanager
 def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
     """Make the body that the parent wants."""
-    if setup.body is BodyKind.EXACT:
-        yield ExactTicks()
-        return
-    from robots.bullet import Reality
-    from robots.puma560.body import RealArm
-
-    with RealArm(reality=Reality(friction=setup.friction, dt=setup.tick), q=setup.q) as arm:
-        yield PumaTicks(arm)
+    make = exact_arm if setup.body == EXACT else load(setup.robot).body(setup.body)
+    with make(setup.q, friction=setup.friction, dt=setup.tick) as arm:
+        yield BodyTicks(arm)
 
 
 class ParentSocket:
@@ -176,6 +146,7 @@ def run(connection: socket.socket) -> int:
             every=setup.every,
             now=clock.now(),
             realtime=realtime,
+            prismatic=setup.prismatic,
         )
         _tick(loop, parent, clock)
     connection.settimeout(_LAST_WORDS)

@@ -26,7 +26,7 @@ from vrs.commands import (
     Target,
 )
 from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
-from vrs.model import Array, RobotModel
+from vrs.model import Array, RobotModel, home
 
 SCHEMA = "vrs-plan/1"
 LATEST = 3600.0
@@ -118,9 +118,24 @@ _MOTION = ("register", "execute", "speed", "motion", "profile", "insertion")
 
 
 def default_plan(model: RobotModel) -> RunPlan:
-    """Read the plan of the demo."""
+    """The plan of the demo: an arm that can't do the usual one goes round its named poses, or to and fro."""
     source = resources.files("interfaces.runtime").joinpath("default_plan.jsonl")
-    return parse_plan(source.read_bytes(), "default_plan.jsonl", model)
+    try:
+        return parse_plan(source.read_bytes(), "default_plan.jsonl", model)
+    except FormatError:
+        return _round_trip(model)
+
+
+def _round_trip(model: RobotModel) -> RunPlan:
+    """Twelve moves; those that take longer than 2.5 s are redirected in motion."""
+    start, span = home(model), model.limits.q_max - model.limits.q_min
+    places = list(model.poses.values()) if len(model.poses) > 1 else []
+    places += [model.limits.q_min + share * span for share in (0.35, 0.65)]
+    motions = tuple(
+        PlannedMotion(f"move {k + 1}", at, MotionCommand(JointTarget(places[k % len(places)]), at, at + 0.5, 0.6))
+        for k, at in enumerate((0.5 + 2.5 * np.arange(12)).tolist())
+    )
+    return RunPlan("Round trip", start, motions, ())
 
 
 def read_plan(path: Path, model: RobotModel) -> RunPlan:
@@ -146,7 +161,7 @@ def parse_plan(data: bytes, name: str, model: RobotModel) -> RunPlan:
     """
     if len(data) > MAX_BYTES:
         raise FormatError(name, f"is longer than the {MAX_BYTES} bytes allowed")
-    title, start = Path(name).stem, model.poses["nominal"]
+    title, start = Path(name).stem, home(model)
     motions: list[PlannedMotion] = []
     payloads: list[PlannedPayload] = []
     for i, (where, line) in enumerate(_lines(data, name)):
@@ -249,16 +264,17 @@ def _start(move: _Move, model: RobotModel) -> Array:
     target = _target(move, model)
     if isinstance(target, JointTarget):
         return target.q
-    return model.inverse_near(target.X, model.poses["nominal"], target.configuration)
+    return model.inverse_near(target.X, home(model), target.configuration)
 
 
 def _target(move: _Move, model: RobotModel) -> Target:
     if isinstance(move, list):
         n = model.limits.dof
         if len(move) != n or not np.isfinite(move).all():
-            raise InvalidValueError("move", move, f"{n} finite joint values [deg]")
-        target = JointTarget(np.radians(move))
-        model.limits.check(target.q)
+            units = "deg" if not model.prismatic else "deg, of prismatic joints m"
+            raise InvalidValueError("move", move, f"{n} finite joint values [{units}]")
+        target = JointTarget([x if j in model.prismatic else math.radians(x) for j, x in enumerate(move)])
+        model.limits.check(target.q, model.prismatic)
         return target
     if move.pose is not None:
         if move.xyz is not None or move.zyz_deg is not None or move.configuration is not None:
@@ -266,7 +282,7 @@ def _target(move: _Move, model: RobotModel) -> Target:
         return JointTarget(model.poses[one_of("pose", move.pose, sorted(model.poses))])
     X = _pose(move.xyz, move.zyz_deg)
     target_pose = PoseTarget(X, move.configuration)
-    model.inverse_near(X, model.poses["nominal"], move.configuration)
+    model.inverse_near(X, home(model), move.configuration)
     return target_pose
 
 

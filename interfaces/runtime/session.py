@@ -9,10 +9,11 @@ that take longer are then postponed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -31,16 +32,14 @@ from interfaces.runs.twin_run import (
     spelled,
     waits,
 )
-from interfaces.runtime.laboratory import Laboratory, RobotBody
+from interfaces.runtime.laboratory import Laboratory
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.system import software
-from interfaces.teleop import JointReference, OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from robots.robot import ArmBody, Robot, exact_arm
 from vrs import Lateness, Receipt, Status
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 from vrs.timeline import Timeline
-
-if TYPE_CHECKING:
-    from robots.puma560.body import RealArm
 
 TICK = 0.001
 """Period of the real robot's servo [s]."""
@@ -58,16 +57,6 @@ LINK_LOSS = "hold"
 """What the robot does when messages stay away."""
 
 
-class ArmBody(RobotBody, Protocol):
-    """A robot's body, with a hand."""
-
-    def attach(self, mass: float) -> None:
-        """Take a load [kg] that the servo doesn't know."""
-
-    def release(self) -> None:
-        """Drop the load."""
-
-
 ArmFactory: TypeAlias = Callable[[Array], AbstractContextManager[ArmBody]]
 """Makes a body at rest at the given joints [rad]."""
 Progress: TypeAlias = Callable[[float], None]
@@ -80,7 +69,7 @@ class TwinSession:
     def __init__(
         self,
         start: Array,
-        model: RobotModel,
+        robot: Robot,
         conditions: LinkConditions,
         body: ArmBody,
         *,
@@ -93,7 +82,7 @@ class TwinSession:
 
         Args:
             start: Joints [rad], (n,).
-            model: The robot.
+            robot: Which robot.
             conditions: What the link does.
             body: The real robot's.
             title: What the run is called.
@@ -101,12 +90,13 @@ class TwinSession:
             offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
             keeper: Who writes it down while it goes on.
         """
-        self._start, self._model, self._offset, self._body = start, model, offset, body
+        model = robot.arm
+        self._start, self._robot, self._offset, self._body = start, robot, offset, body
         self.operator = OperatorSite(model, start, now=0.0, lateness=Lateness.POSTPONE)
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
-        self._robot = RobotSite(model, start, now=0.0, config=config)
+        self._site = RobotSite(model, start, now=0.0, config=config)
         self.lab = Laboratory(
-            self.operator, self._robot, conditions, np.random.default_rng(seed),
+            self.operator, self._site, conditions, np.random.default_rng(seed),
             tick=TICK, every=round(STEP / TICK), body=body,
         )  # fmt: skip
         self._sent: list[tuple[float, PlannedCommand, Receipt]] = []
@@ -118,12 +108,12 @@ class TwinSession:
         self._told = self._corrected = self._blocks = self._rows = 0
         self._halted: set[int] = set()
         self._cues, self._handled = 0, 0.0
-        self._first_play = self._robot.play_at(np.zeros(1)).p
+        self._first_play = self._site.play_at(np.zeros(1)).p
         self.last_action = 0.0
         """When the operator did something last, or will [s]; infinity while that's unknown."""
         link = conditions.forward
         self._session = Begin(
-            t=0.0, robot=model.name, driver="laboratory", title=text(title), seed=seed,
+            t=0.0, robot=robot.name, driver="laboratory", title=text(title), seed=seed,
             delay=text(link.delay.name), offset=spelled(offset), service=str(link.service), link_loss=LINK_LOSS,
             step=STEP, q=start.tolist(), lateness=Lateness.POSTPONE.value, software=software(),
         )  # fmt: skip
@@ -179,7 +169,7 @@ class TwinSession:
         self._messages += there
         self._lost |= {m.sent for m in there if m.lost is not None or m.attempts > 1}
         packets = self._settle()
-        self._events += correction_events(corrections[self._corrected :])
+        self._events += correction_events(corrections[self._corrected :], self._robot.arm.prismatic)
         self._corrected = len(corrections)
         for epoch in sorted(lab.halts.keys() - self._halted):
             self._halted.add(epoch)
@@ -200,9 +190,9 @@ class TwinSession:
 
     def _robot_rests(self) -> float | None:
         """When the robot had done everything that it was told [s]; None if it hasn't."""
-        everything = self._robot.halted or (len(self.lab.answers) == len(self._sent) and not self._cues)
-        began = self._robot.epoch > 0 or self._offset is not None
-        end = self._robot.engine.timeline.end - 1e-9
+        everything = self._site.halted or (len(self.lab.answers) == len(self._sent) and not self._cues)
+        began = self._site.epoch > 0 or self._offset is not None
+        end = self._site.engine.timeline.end - 1e-9
         if not (everything and began) or self._play_at(self.lab.now) < end:
             return None
         return STEP * float(np.searchsorted(self._play(), end))
@@ -210,7 +200,7 @@ class TwinSession:
     def _agree(self, arrived: float) -> bool:
         """Whether the operator has heard of all that the robot did otherwise."""
         report = self.operator.report
-        return not self._robot.parted or (report is not None and report.sent_at >= arrived)
+        return not self._site.parted or (report is not None and report.sent_at >= arrived)
 
     def _play(self) -> Array:
         """Play time in each row of the record, the first moment included [s]."""
@@ -237,10 +227,10 @@ class TwinSession:
         reference = np.vstack([self._start, self.lab.reference.q])[:rows]
         corrections = tuple(self.operator.corrections)
         self._settle(all_of_them=True)
-        events = [*self._events, *waits(t, play, reference, slowest=1.0 - self._robot.config.playout.slew)]
+        events = [*self._events, *waits(t, play, reference, slowest=1.0 - self._site.config.playout.slew)]
         arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
         run = TwinRun(
-            model=self._model,
+            robot=self._robot,
             session=self._session,
             t=t,
             play=play,
@@ -261,7 +251,7 @@ class TwinSession:
         return run
 
     def _play_at(self, t: float) -> float:
-        return float(self._robot.play_at(np.array([t])).p[0])
+        return float(self._site.play_at(np.array([t])).p[0])
 
     def _answers(self) -> list[Receipt | None]:
         """What the robot's engine answered to each command that was sent."""
@@ -288,75 +278,23 @@ class TwinSession:
     def _receipts(self) -> tuple[Receipt, ...]:
         """The truth about every command at the robot; of those before a stop, what was answered then."""
         answered = {answer.command_id: answer for answer in self._answers() if answer is not None}
-        answered |= {receipt.command_id: receipt for receipt in self._robot.engine.receipts}
+        answered |= {receipt.command_id: receipt for receipt in self._site.engine.receipts}
         return tuple(answered[command_id] for command_id in sorted(answered))
 
     def _commanded(self) -> Timeline:
         """What the commands alone make of the virtual robot."""
-        return commands_alone(self._model, self._start, self._sent)
+        return commands_alone(self._robot.arm, self._start, self._sent)
 
 
 def unheard(t: float) -> None:
     """Report no progress."""
 
 
-class ExactArm:
-    """A body with no dynamics: it is where its reference is, whatever it holds."""
-
-    def follow(self, reference: JointReference) -> Array:
-        """Return the references (m, n) [rad]."""
-        return reference.q
-
-    def attach(self, mass: float) -> None:
-        """Take a load, which changes nothing."""
-
-    def release(self) -> None:
-        """Drop the load, which changes nothing."""
-
-
-class _Puma:
-    """The PyBullet PUMA 560 behind the driver's interface."""
-
-    def __init__(self, arm: RealArm) -> None:
-        self.arm = arm
-
-    def follow(self, reference: JointReference) -> Array:
-        return self.arm.run(*reference).q
-
-    def attach(self, mass: float) -> None:
-        from robots.bullet import Payload
-
-        self.arm.attach(Payload(mass=mass))
-
-    def release(self) -> None:
-        self.arm.release()
-
-
-@contextmanager
-def exact_arm(_q: Array) -> Iterator[ArmBody]:
-    """Make a body that follows exactly."""
-    yield ExactArm()
-
-
-def simulated_puma(*, friction: bool = True) -> ArmFactory:
-    """Say how to make a PyBullet PUMA 560, with or without friction in its joints."""
-
-    @contextmanager
-    def make(q: Array) -> Iterator[ArmBody]:
-        from robots.bullet import Reality
-        from robots.puma560.body import RealArm
-
-        with RealArm(reality=Reality(friction=friction), q=q) as arm:
-            yield _Puma(arm)
-
-    return make
-
-
 def run_twins(
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
-    arm: ArmFactory,
+    arm: ArmFactory | None = None,
     *,
     seed: int,
     offset: float | None = None,
@@ -368,9 +306,9 @@ def run_twins(
 
     Args:
         plan: What the operator does.
-        model: The robot.
+        robot: Which robot.
         profile: The link's delay, either way.
-        arm: Makes the real robot's body.
+        arm: Makes the real robot's body; its usual one unless given.
         seed: Seed of the link, ≥ 0.
         offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
@@ -381,9 +319,9 @@ def run_twins(
         The record, every 20 ms of user time, until both robots have been at rest for 2 s.
     """
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
-    with arm(plan.start) as body:
+    with (arm or robot.body())(plan.start) as body:
         session = TwinSession(
-            plan.start, model, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
+            plan.start, robot, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
         )
         for motion in plan.motions:
             session.lab.schedule(motion.registered_at, lambda now, motion=motion: _register(session, motion, now))  # type: ignore[misc]
@@ -404,7 +342,7 @@ def _register(session: TwinSession, item: PlannedMotion, now: float) -> None:
 def run_without(
     causes: frozenset[str],
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
     *,
     seed: int,
@@ -420,7 +358,7 @@ def run_without(
             `payload_and_friction` the hand stays empty and the joints turn freely; without `servo` the body
             is where its reference is.
         plan: What the operator does.
-        model: The robot.
+        robot: Which robot.
         profile: The link's delay, unless it is switched off.
         seed: Seed of the link.
         offset: A fixed D [s], ≤ 0, unless the network is switched off; None adapts it.
@@ -433,15 +371,15 @@ def run_without(
     free = "payload_and_friction" in causes
     if free:
         plan = replace(plan, payloads=())
-    arm = exact_arm if "servo" in causes else simulated_puma(friction=not free)
+    arm = exact_arm if "servo" in causes else partial(robot.body(), friction=not free)
     return run_twins(
-        plan, model, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
+        plan, robot, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
     )
 
 
 def offset_outcome(
     plan: RunPlan,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
     *,
     seed: int,
@@ -451,7 +389,7 @@ def offset_outcome(
 ) -> OffsetOutcome:
     """Run a plan for the sake of its offset: see `interfaces.runtime.session.run_twins`."""
     run = run_twins(
-        replace(plan, payloads=()), model, profile, exact_arm,
+        replace(plan, payloads=()), robot, profile, exact_arm,
         seed=seed, offset=offset, service=service, progress=progress,
     )  # fmt: skip
     kinds = [event.kind for event in run.events]

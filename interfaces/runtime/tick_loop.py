@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -38,7 +38,7 @@ from interfaces.runtime.physics_messages import (
 from robots.onboard.following import SensorMonitor
 from robots.onboard.servo import from_measured
 from vrs.errors import FormatError, VrsError
-from vrs.model import Array, Limits
+from vrs.model import Array, Limits, unit_of
 
 KEPT = 300
 """For how many ticks rows are kept that are over."""
@@ -257,7 +257,16 @@ class TickLoop:
     """Runs a body on references, and brings it to rest where they fail."""
 
     def __init__(
-        self, body: TickBody, limits: Limits, q: Row, *, tick: float, every: int, now: float, realtime: bool = False
+        self,
+        body: TickBody,
+        limits: Limits,
+        q: Row,
+        *,
+        tick: float,
+        every: int,
+        now: float,
+        realtime: bool = False,
+        prismatic: Collection[int] = (),
     ) -> None:
         """Hold a position.
 
@@ -269,13 +278,15 @@ class TickLoop:
             every: Ticks from one report to the next, ≥ 1.
             now: By the robot's clock [s].
             realtime: What to tell the parent of the process's priority.
+            prismatic: Joints that are, from 0: [m] for [rad].
         """
         self._body, self._limits, self._tick, self._every = body, limits, tick, every
         self._speeds, self._changes = (_OVER * limits.qd_max).tolist(), (_TICKS * tick * limits.qdd_max).tolist()
         self._last = math.floor(now / tick + _SAME)
         self._at = _TickState(list(q), [0.0] * len(q), [0.0] * len(q), None)
         self._measured, self._measured_tick = Moved(q, [0.0] * len(q), ()), (self._last, self._last)
-        self._monitor, self._blind = SensorMonitor(limits), False
+        self._monitor, self._blind = SensorMonitor(limits, prismatic), False
+        self._prismatic = prismatic
         self._buffer, self._ahead = RowBuffer(), deque[tuple[int, _TickState]]()
         self._placing: int | None = None
         self._lag = 0
@@ -426,8 +437,9 @@ class TickLoop:
         self._belated = False
         if joint is None:
             return step
-        way = f"from {self._at.q[joint]:.6g} rad at {self._at.qd[joint]:.4g} rad/s"
-        text = f"joint {joint + 1} would jump {way} to {step.q[joint]:.6g} rad at {step.qd[joint]:.4g} rad/s"
+        unit = unit_of(joint, self._prismatic)
+        way = f"from {self._at.q[joint]:.6g} {unit} at {self._at.qd[joint]:.4g} {unit}/s"
+        text = f"joint {joint + 1} would jump {way} to {step.q[joint]:.6g} {unit} at {step.qd[joint]:.4g} {unit}/s"
         self._fail(FaultKind.JUMPED, text, k)
         return None
 

@@ -19,6 +19,7 @@ from interfaces.recording.stages import prepare
 from interfaces.station.shelf import LOOKED_INTO, Shelf
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import Viewers
+from robots.robot import Robot
 from vrs.checks import one_of
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
@@ -173,7 +174,7 @@ class Replays:
         """Open it, play it while somebody looks, close it."""
         try:
             paths = [self._shelf.path(name) for name in replay.key.names]
-            async with _opened(paths, replay.key.align) as playback:
+            async with _opened(paths, replay.key.align, self._shelf.robot) as playback:
                 await self._show(replay, playback)
         except VrsError as error:
             replay.say("failed", str(error))
@@ -218,10 +219,10 @@ def _key(query: Mapping[str, str]) -> _Key:
 
 
 @contextlib.asynccontextmanager
-async def _opened(paths: Sequence[Path], align: Align) -> AsyncIterator[Playback]:
+async def _opened(paths: Sequence[Path], align: Align, robot: Robot | None) -> AsyncIterator[Playback]:
     """A play-back of files that are read as far as it takes long; they're closed in the end."""
     found: list[Recording] = []
-    opening = asyncio.create_task(asyncio.to_thread(_open, paths, align, found))
+    opening = asyncio.create_task(asyncio.to_thread(_open, paths, align, found, robot))
     try:
         yield await asyncio.shield(opening)
     finally:
@@ -231,7 +232,7 @@ async def _opened(paths: Sequence[Path], align: Align) -> AsyncIterator[Playback
             recording.close()
 
 
-def _open(paths: Sequence[Path], align: Align, found: list[Recording]) -> Playback:
+def _open(paths: Sequence[Path], align: Align, found: list[Recording], robot: Robot | None) -> Playback:
     """Open files; runs in a thread.
 
     Raises:
@@ -242,7 +243,7 @@ def _open(paths: Sequence[Path], align: Align, found: list[Recording]) -> Playba
     if size > LOOKED_INTO:
         allowed = f"up to {LOOKED_INTO / 2**20:.0f} MiB together: vrs replay opens larger ones"
         raise InvalidValueError("recordings", f"{size / 2**20:.0f} MiB", allowed)
-    found.extend(open_recording(path) for path in paths)
+    found.extend(open_recording(path, robot) for path in paths)
     for recording in found:
         # What is read or put together once is read here.
         prepare(recording)

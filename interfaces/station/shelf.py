@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from interfaces.recording.recording import open_recording
+from robots.robot import Robot
 from vrs.errors import FormatError, InvalidValueError
 
 LISTED: Final = 200
@@ -62,9 +63,14 @@ class ShelfEntry:
 class Shelf:
     """Looks at the directory; each file is looked into once, as long as it stays as it is."""
 
-    def __init__(self, directory: Path) -> None:
-        """Look at a directory, which needn't be there yet."""
-        self.directory = directory
+    def __init__(self, directory: Path, robot: Robot | None = None) -> None:
+        """Look at a directory, which needn't be there yet.
+
+        Args:
+            directory: Where recordings are.
+            robot: What they may be of, beside robots that are found by their names.
+        """
+        self.directory, self.robot = directory, robot
         self.known: OrderedDict[tuple[str, int, int], ShelfEntry] = OrderedDict()
         """Files that were looked into, by name, size and time; the last ones."""
 

@@ -155,7 +155,7 @@ class RobotSiteConfig:
     beat: Annotated[float, within(1e-3, 10.0)] = 0.1
     """Time between two reports [s], in [0.001, 10]."""
     tolerance: Annotated[float, within(1e-6, 10.0)] = 0.1
-    """Following error of a joint above which the robot stops [rad], in [1e-6, 10]."""
+    """Following error of a joint above which the robot stops [rad, of a prismatic one m], in [1e-6, 10]."""
     watchdog: WatchdogConfig | None = None
     """When the link counts as lost, and the robot halts; None holds: it goes on when messages come again."""
 
@@ -199,7 +199,8 @@ class RobotSite:
         """Why it stopped by itself; empty while it follows the operator."""
         self.violation: Violation | None = None
         """What was measured that stopped it; None where it wasn't that, or since it may move again."""
-        self._monitor = SensorMonitor(model.limits)
+        self._prismatic = model.prismatic
+        self._monitor = SensorMonitor(model.limits, model.prismatic)
         self._uncertainty: float | None = None
         self.parted = False
         """Whether its timeline is another than the operator's."""
@@ -411,7 +412,7 @@ class RobotSite:
         self._measured, self._measured_at = np.array(q, float), (at, p)
         reference = self.engine.timeline.sample(p)
         self._samples.add(at, p, self._measured, reference)
-        abort = too_far(reference, self._measured, self.config.tolerance)
+        abort = too_far(reference, self._measured, self.config.tolerance, self._prismatic)
         return self._violated(abort, now, measured=self._measured)
 
     def _violated(self, violation: Violation | None, now: float, measured: Array | None = None) -> bool:

@@ -27,7 +27,7 @@ from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.source import SourceFile
 from vrs.clock import ManualClock
 from vrs.engine import Engine
-from vrs.model import Array, RobotModel
+from vrs.model import Array, RobotModel, home
 from vrs.timeline import Timeline
 
 
@@ -193,7 +193,7 @@ def rehearse(
         start: Where the arm stands [rad], (n,); in its `nominal` pose unless given.
     """
     now, computed, clock = 0.0, 0.0, ManualClock(0.0)
-    engine = Engine(model, q=model.poses["nominal"] if start is None else start, clock=clock)
+    engine = Engine(model, q=home(model) if start is None else start, clock=clock)
     rng = random.Random(0)  # noqa: S311 - RANDOM is no secret
     player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, skips=True)
     player.begin(0.0)

@@ -15,9 +15,10 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
+from robots.robot import Robot
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt
-from vrs.model import RobotModel
+from vrs.model import home
 
 LONGEST: Final = 600.0
 """How long a program may take [s], by default."""
@@ -79,9 +80,9 @@ class _Operator:
 
 def play(
     source: SourceFile,
-    model: RobotModel,
+    robot: Robot,
     profile: DelayProfile,
-    arm: ArmFactory,
+    arm: ArmFactory | None = None,
     *,
     seed: int,
     offset: float | None = None,
@@ -95,9 +96,9 @@ def play(
 
     Args:
         source: The file.
-        model: The robot.
+        robot: Which arm.
         profile: The link's delay, either way.
-        arm: Makes the real robot's body.
+        arm: Makes the real robot's body; its usual one unless given.
         seed: Seed of the link and of RANDOM, ≥ 0.
         offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
@@ -109,15 +110,15 @@ def play(
     Raises:
         ValError: If the program can't be begun.
     """
-    start = model.poses["nominal"]
+    start = home(robot.arm)
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
-    with arm(start) as body:
+    with (arm or robot.body())(start) as body:
         session = TwinSession(
-            start, model, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
+            start, robot, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
         )
         operator = _Operator(session, limit, source.name)
-        robot = SiteRobot(session.operator, operator.executed)
-        val = Arm(robot, parameters=operator.parameters, gripped=operator.gripped)
+        site = SiteRobot(session.operator, operator.executed)
+        val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
         operator.player = player = Player(source, val, listeners or Listeners(), rng)
         session.last_action = math.inf

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from robots.ipr.model import Body, Ipr, Kind, model
+from robots.ipr.model import Kind, model
 
-__all__ = ["Body", "Ipr", "Kind", "model"]
+__all__ = ["Kind", "model"]

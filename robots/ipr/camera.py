@@ -15,10 +15,11 @@ from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
+from robots.base import upright
 from robots.bullet.rooms import EMPTY, Room, is_wall
 from robots.bullet.world import Picture, Studio
 from robots.ipr.model import IPR_AXLE_OFFSET
-from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes, upright
+from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError

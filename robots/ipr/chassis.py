@@ -19,6 +19,7 @@ from typing import Annotated, Final
 
 import numpy as np
 
+from robots.base import Footprint
 from robots.bullet.serial_arm import Payload
 from robots.ipr.model import (
     IPR_AXLE_OFFSET,
@@ -165,6 +166,11 @@ class Chassis:
         """All of it [kg]."""
         moving = 2 * self.wheel_mass + len(self.casters) * self.caster_mass + sum(limb.mass for limb in self.limbs)
         return sum(lump.mass for lump in self.lumps) + moving
+
+    @property
+    def footprint(self) -> Footprint:
+        """The box that it fills."""
+        return Footprint(self.length, self.width, self.height, self.mass, -self.centre_x)
 
     @property
     def reach(self) -> float:

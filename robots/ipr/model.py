@@ -6,13 +6,11 @@ same robot. What neither gives is an assumption; its reason stands beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import hypot
 from typing import Final
 
+from robots.base import Footprint, MobileBase
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
-from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, Wheels
 
@@ -58,50 +56,9 @@ class Kind(StrEnum):
     """The 430 g robot of section 4.2."""
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A box on wheels; its reference point is the middle of the driving axle."""
-
-    length: float
-    """Along the direction of travel [m]."""
-    width: float
-    """Across it [m]."""
-    height: float
-    """[m]."""
-    mass: float
-    """[kg]."""
-    axle_offset: float
-    """How far the driving axle is ahead of the body's centre [m]."""
-
-    @property
-    def radius(self) -> float:
-        """Of the circle about the reference point that holds the whole body [m]."""
-        return hypot(0.5 * self.length + abs(self.axle_offset), 0.5 * self.width)
-
-
-@dataclass(frozen=True, slots=True)
-class Ipr:
-    """An internet-based personal robot. Source: Han, Kim, Kim, Kim, 2001, section 2."""
-
-    limits: DriveLimits
-    wheels: Wheels
-    body: Body
-    period: float = PERIOD
-    """T: time between commands [s], positive."""
-    kind: Kind = Kind.IPR
-    name: str = "ipr"
-
-    def __post_init__(self) -> None:
-        if finite("period", self.period, "positive seconds") <= 0:
-            raise InvalidValueError("period", self.period, "positive seconds")
-
-    @property
-    def radius(self) -> float:
-        """Of the circle about the reference point that holds the whole robot [m]."""
-        return self.body.radius
-
-
-def model(kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, period: float | None = None) -> Ipr:
+def model(
+    kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, period: float | None = None
+) -> MobileBase:
     """Return an IPR.
 
     Args:
@@ -118,11 +75,10 @@ def model(kind: Kind | str = Kind.IPR, *, limits: DriveLimits | None = None, per
         raise InvalidValueError("kind", kind, f"one of {', '.join(Kind)}") from None
     if which is Kind.IPR:
         wheels = Wheels(IPR_WHEEL_BASE, IPR_WHEEL_RADIUS)
-        body = Body(IPR_LENGTH, IPR_WIDTH, IPR_HEIGHT, IPR_MASS, IPR_AXLE_OFFSET)
+        body = Footprint(IPR_LENGTH, IPR_WIDTH, IPR_HEIGHT, IPR_MASS, IPR_AXLE_OFFSET)
     else:
         wheels = Wheels(MICRO_WHEEL_BASE, MICRO_WHEEL_RADIUS)
-        body = Body(MICRO_SIDE, MICRO_SIDE, MICRO_SIDE, MICRO_MASS, MICRO_AXLE_OFFSET)
+        body = Footprint(MICRO_SIDE, MICRO_SIDE, MICRO_SIDE, MICRO_MASS, MICRO_AXLE_OFFSET)
     if limits is None:
         limits = drive_limits(wheels.base)
-    made = Ipr(limits, wheels, body, kind=which)
-    return made if period is None else replace(made, period=period)
+    return MobileBase(limits, wheels, body, PERIOD if period is None else period, "ipr")

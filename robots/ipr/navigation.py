@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from robots.base import Footprint
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Chassis
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
@@ -24,10 +24,10 @@ _ROUND = 16
 """Corners of a column's outline."""
 
 
-def outline_of(chassis: Chassis) -> Outline:
+def outline_of(body: Footprint) -> Outline:
     """The rectangle that a robot fills."""
-    half = chassis.length / 2
-    return Outline(half + chassis.centre_x, half - chassis.centre_x, chassis.width / 2)
+    half = body.length / 2
+    return Outline(half - body.axle_offset, half + body.axle_offset, body.width / 2)
 
 
 def mounts_of(body: MobileRobot) -> tuple[SonarMount, ...]:
@@ -36,14 +36,14 @@ def mounts_of(body: MobileRobot) -> tuple[SonarMount, ...]:
     return tuple(SonarMount(x, y, angle) for (x, y), angle in zip(places, angles, strict=True))
 
 
-def route_config(chassis: Chassis) -> RouteConfig:
+def route_config(body: Footprint) -> RouteConfig:
     """What room a robot needs on its routes."""
-    outline = outline_of(chassis)
+    outline = outline_of(body)
     turning = math.hypot(max(outline.front, outline.rear), outline.half_width)
     return RouteConfig(turning, outline.half_width)
 
 
-def route_map(room: Room, chassis: Chassis) -> RouteMap:
+def route_map(room: Room, body: Footprint) -> RouteMap:
     """The ways that a robot knows: of a room's plan, as far as that is known."""
     known = room.known()
     things = [*(_corners(b.x, b.y, b.angle, b.length, b.width) for b in known.blocks)]
@@ -51,7 +51,7 @@ def route_map(room: Room, chassis: Chassis) -> RouteMap:
     turns = np.arange(_ROUND) * math.tau / _ROUND
     ring = out * np.column_stack([np.cos(turns), np.sin(turns)])
     things += [c.radius * ring + (c.x, c.y) for c in known.columns]
-    return RouteMap((room.length, room.width), things, route_config(chassis), via=room.via)
+    return RouteMap((room.length, room.width), things, route_config(body), via=room.via)
 
 
 def _corners(x: float, y: float, angle: float, length: float, width: float) -> Array:
@@ -68,7 +68,7 @@ def navigator_config(body: MobileRobot, period: float, journey: JourneyConfig | 
         period: Between two drives [s].
         journey: How long it tries; as usual unless given.
     """
-    outline, (near, far) = outline_of(body.chassis), body.chassis.sonar_reach
+    outline, (near, far) = outline_of(body.chassis.footprint), body.chassis.sonar_reach
     mounts = mounts_of(body)
     sonar = body.senses.sonar
     half_cone = 0.0 if sonar is None else sonar.half_angle
@@ -104,7 +104,7 @@ class BodyNavigator:
         """
         room = body.room
         shape = math.ceil(room.length / CELL - 1e-9), math.ceil(room.width / CELL - 1e-9)
-        ways = route_map(room, body.chassis) if roads is None else roads
+        ways = route_map(room, body.chassis.footprint) if roads is None else roads
         self._body = body
         self.navigator = Navigator(ways, Grid(shape, CELL), navigator_config(body, period, journey))
         """What decides."""

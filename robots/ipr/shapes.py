@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robots.base import upright
 from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.ipr.chassis import IPR, MICRO, Chassis, chassis
 from robots.ipr.drive_train import as_posture
@@ -253,12 +254,6 @@ def links(kind: str, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters
         poses.append(X_WR @ turned)
     poses += [X_WR @ upright(*at, angle) for at, angle in zip(body.casters, swivels, strict=True)]
     return frozen_array(np.stack(poses))
-
-
-def upright(x: float, y: float, angle: float) -> Array:
-    """Return the pose of a frame on the floor at (x, y) [m] that is turned by an angle [rad], (4, 4)."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
 def room_shapes(room: Room) -> tuple[LinkShape, ...]:

@@ -8,7 +8,7 @@ knows the measured one, and a mobile robot stops.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
@@ -16,16 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.onboard.driving import Posture
-from vrs.model import Array, Limits
+from vrs.model import Array, Limits, unit_of
 
 BLIND = 0.05
 """So long a robot goes on without a sound measurement [s]."""
 _BEYOND = math.pi
 """A joint may read so far beyond its limits [rad]: it hit something, or its encoder is off."""
+_BEYOND_M = 0.5
+"""And a prismatic joint [m]."""
 _FASTEST = 1e3
-"""No joint is faster [rad/s]; one that hits something has moments of 34."""
+"""No joint is faster [rad/s, m/s]; one that hits something has moments of 34."""
 _STRONGEST = 1e6
-"""No drive is stronger [N m]."""
+"""No drive is stronger [N m, N]."""
 _ROUNDING = 1e-9
 """Of times [s]."""
 
@@ -53,13 +55,15 @@ class FollowingAbort:
     joint: int
     """Index of the joint that is furthest away."""
     error: float
-    """Its distance from the reference [rad]."""
+    """Its distance from the reference, in `unit`."""
     tolerance: float
-    """What was allowed [rad]."""
+    """What was allowed, in `unit`."""
+    unit: str = "rad"
+    """`rad`, or `m` of a prismatic joint."""
 
     def __str__(self) -> str:
         """Say it in a line."""
-        away, limit = f"{self.error:.3g} rad", f"{self.tolerance:g} rad"
+        away, limit = f"{self.error:.3g} {self.unit}", f"{self.tolerance:g} {self.unit}"
         return f"joint {self.joint + 1} is {away} from where it should be, more than {limit}"
 
 
@@ -72,13 +76,15 @@ class SensorMonitor:
 
     __slots__ = ("_bounds", "_fault", "_since")
 
-    def __init__(self, limits: Limits) -> None:
-        """Take the joints' limits."""
+    def __init__(self, limits: Limits, prismatic: Collection[int] = ()) -> None:
+        """Take the joints' limits, and which of them are prismatic."""
         n = limits.dof
+        units = [unit_of(j, prismatic) for j in range(n)]
+        beyond = [_BEYOND_M if unit == "m" else _BEYOND for unit in units]
         self._bounds = (
-            ((limits.q_min - _BEYOND).tolist(), (limits.q_max + _BEYOND).tolist(), "rad"),
-            ([-_FASTEST] * n, [_FASTEST] * n, "rad/s"),
-            ([-_STRONGEST] * n, [_STRONGEST] * n, "N m"),
+            ((limits.q_min - beyond).tolist(), (limits.q_max + beyond).tolist(), units),
+            ([-_FASTEST] * n, [_FASTEST] * n, [f"{unit}/s" for unit in units]),
+            ([-_STRONGEST] * n, [_STRONGEST] * n, ["N" if unit == "m" else "N m" for unit in units]),
         )
         self._fault: SensorFault | None = None
         self._since = 0.0
@@ -110,23 +116,26 @@ class SensorMonitor:
         return self._fault if now - self._since >= BLIND - _ROUNDING else None
 
 
-def too_far(q_ref: Array, q: Array, tolerance: float) -> FollowingAbort | None:
+def too_far(q_ref: Array, q: Array, tolerance: float, prismatic: Collection[int] = ()) -> FollowingAbort | None:
     """Compare sound measured joints with their references.
 
     Args:
         q_ref: Commanded [rad], (n,).
         q: Measured [rad], (n,).
-        tolerance: How far a joint may be away [rad].
+        tolerance: How far a joint may be away [rad], a prismatic one [m].
+        prismatic: Which are, from 0.
 
     Returns:
         The joint that is furthest away, where that's too far; None if none is.
     """
     away = np.abs(q - q_ref)
     joint = int(away.argmax())
-    return None if away[joint] <= tolerance else FollowingAbort(joint, float(away[joint]), tolerance)
+    if away[joint] <= tolerance:
+        return None
+    return FollowingAbort(joint, float(away[joint]), tolerance, unit_of(joint, prismatic))
 
 
-def _fault(values: object, low: Sequence[float], high: Sequence[float], unit: str) -> SensorFault | None:
+def _fault(values: object, low: Sequence[float], high: Sequence[float], units: Sequence[str]) -> SensorFault | None:
     """The first number that isn't in its range; None if all are."""
     if isinstance(values, np.ndarray):
         values = values.tolist()
@@ -136,7 +145,7 @@ def _fault(values: object, low: Sequence[float], high: Sequence[float], unit: st
     for joint, (value, least, most) in enumerate(zip(values, low, high, strict=True)):
         # NaN is in no range.
         if not isinstance(value, (int, float)) or not least <= value <= most:
-            return SensorFault(joint, f"{value} {unit}"[:60])
+            return SensorFault(joint, f"{value} {units[joint]}"[:60])
     return None
 
 

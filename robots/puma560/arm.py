@@ -223,6 +223,11 @@ class Puma560:
         return "puma560"
 
     @property
+    def prismatic(self) -> tuple[int, ...]:
+        """None of its joints."""
+        return ()
+
+    @property
     def poses(self) -> Mapping[str, Array]:
         """Joint values of `ready`, `zero`, `nominal` and `stretch`, each (6,) [rad]."""
         return POSES

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from operator import truediv
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.bullet.drives import Drives
 from robots.bullet.serial_arm import Payload, Reality, RigidLink, load_arm
@@ -23,6 +22,7 @@ from robots.onboard.servo import Servo, ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.dynamics import nominal_torques
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, DOF, FLANGE, POSES
+from robots.robot import Measured, Prepared
 from vrs.checks import finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
@@ -30,35 +30,6 @@ from vrs.model import Array, frozen_array
 _BOUNDS = (1e3, 1e3, 1e5)
 _JOINTS = tuple(range(DOF))
 _ZERO = (0.0,) * DOF
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """What a block of steps did; row i is the state at the end of step i."""
-
-    q: Array
-    """Encoder readings [rad], (k, 6)."""
-    qd: Array
-    """Joint speeds [rad/s], (k, 6)."""
-    tau: Array
-    """Drive torques [N m], (k, 6), limited; row i acted during step i."""
-    saturated: NDArray[np.int64]
-    """Steps in which a drive was at its limit, by joint, (6,)."""
-
-
-class Prepared(NamedTuple):
-    """References with the feed-forward that belongs to them, (k, 6) each."""
-
-    q: Array
-    """[rad]."""
-    qd: Array
-    """[rad/s]."""
-    feedforward: Array
-    """[N m]."""
-
-    def row(self, i: int) -> Prepared:
-        """One of them, (1, 6) each."""
-        return Prepared(self.q[i : i + 1], self.qd[i : i + 1], self.feedforward[i : i + 1])
 
 
 def puma_links(payload: Payload | None = None) -> tuple[RigidLink, ...]:
@@ -265,11 +236,9 @@ class RealArm:
         self._servo.hold(self._q)
         self._set_state()
 
-    def attach(self, payload: Payload) -> None:
-        """Hold a payload at the flange instead of what was held; speeds stay, the servo isn't told."""
-        if not isinstance(payload, Payload):
-            raise InvalidValueError("payload", payload, "a Payload")
-        self._exchange(payload)
+    def attach(self, payload: Payload | float) -> None:
+        """Hold a payload, or a mass [kg], in place of what was held; speeds stay, the servo isn't told."""
+        self._exchange(payload if isinstance(payload, Payload) else Payload(payload))
 
     def release(self) -> None:
         """Let the payload go; without one nothing changes."""

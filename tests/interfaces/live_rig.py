@@ -26,15 +26,16 @@ from interfaces.runtime.live.physics_body import PhysicsBody
 from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.physics import PhysicsConfig
-from interfaces.runtime.physics_messages import BodyKind
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
-from robots import puma560
+from robots import load
 from robots.onboard import WatchdogConfig
+from robots.robot import EXACT
 
-MODEL = puma560.model()
+ROBOT = load("puma560")
+MODEL = ROBOT.arm
 NOMINAL, READY = MODEL.poses["nominal"], MODEL.poses["ready"]
 HALT = WatchdogConfig(max_age=2.0, max_uncertainty=1.0)
 LEAD = 0.2
@@ -72,13 +73,13 @@ class Rows:
 
 @contextlib.asynccontextmanager
 async def robot_here(
-    *, site: RobotSiteConfig | None = None, body: BodyKind = BodyKind.EXACT, port: int = 0
+    *, site: RobotSiteConfig | None = None, body: str = EXACT, port: int = 0
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
-    made = PhysicsBody(MODEL, PhysicsConfig(MODEL.limits, NOMINAL, body), host)
+    made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
     robot = LiveRobot(made, Access(free={Role.SITE}))
     app = application(robot.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening, largest=LARGEST), robot.running():
@@ -92,7 +93,7 @@ async def operator_here(url: str, *, delay: str = "none") -> AsyncIterator[tuple
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(LiveOperatorConfig(MODEL, NOMINAL, url, link), Access(free=OPEN))
+    operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, url, link), Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"

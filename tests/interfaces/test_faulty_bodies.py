@@ -11,12 +11,13 @@ import pytest
 
 from interfaces.messages.sites import Report
 from interfaces.runtime.physics_messages import FaultKind, Measurement
-from interfaces.runtime.physics_process import ExactTicks
+from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
 from interfaces.teleop.halt import Halt, HaltCause
 from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
+from robots.robot import ExactArm, Prepared
 from tests.interfaces.test_host import READY, STEP, Ends, to
 from tests.interfaces.test_tick_loop import Bench, rows
 from tests.interfaces.ticks import TICK, motion, sampled
@@ -45,13 +46,14 @@ def wild(moved: Moved) -> Moved:
 SPOILT = [*(joint(k % 6, bad) for k, bad in enumerate(BAD)), shorter, wild]
 
 
-class Faulty(ExactTicks):
+class Faulty(BodyTicks):
     """An exact body whose sensors fail in some ticks."""
 
     def __init__(self, spoil: Spoil, when: Callable[[int], bool]) -> None:
+        super().__init__(ExactArm())
         self.spoil, self.when, self.ticks = spoil, when, 0
 
-    def step(self, prepared: Moved) -> Moved:
+    def step(self, prepared: Prepared) -> Moved:
         self.ticks += 1
         moved = super().step(prepared)
         return self.spoil(moved) if self.when(self.ticks) else moved

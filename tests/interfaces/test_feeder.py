@@ -10,10 +10,11 @@ from interfaces.messages.control import Pong
 from interfaces.messages.sites import Orders
 from interfaces.runtime.physics import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
-from interfaces.runtime.physics_process import ExactTicks
+from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine
 from interfaces.teleop.halt import Halt, HaltCause
+from robots.robot import ExactArm
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand
 
@@ -34,7 +35,7 @@ class Site:
         self.line.connected = True
         self.host = RobotHost(MODEL, NOMINAL, now=0.0, config=RobotHostConfig(lead=0.02), seed=7)
         self.host.hello("session", now=0.0)
-        self.loop = TickLoop(ExactTicks(), LIMITS, tuple(NOMINAL), tick=TICK, every=20, now=0.0)
+        self.loop = TickLoop(BodyTicks(ExactArm()), LIMITS, tuple(NOMINAL), tick=TICK, every=20, now=0.0)
         self.feeder = Feeder(self.host, self, now=0.0)
         self.told: list[Rows] = []
         self.news: list[News] = []

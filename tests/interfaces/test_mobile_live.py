@@ -36,7 +36,7 @@ from interfaces.stream.connection import MobileConnection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
-from robots import ipr
+from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal, JourneyState
@@ -45,6 +45,7 @@ from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
 from vrs.errors import InvalidValueError
 
+ROBOT = load("ipr")
 ROOM = place("empty")
 HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 
@@ -53,13 +54,11 @@ HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
     robot_at, at = (sockets.bind("127.0.0.1", 0) for _ in range(2))
-    config = PacedConfig(ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    config = PacedConfig(ROBOT, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
     robot = LiveRobot(PacedBody(config), Access(free={Role.SITE}))
     port, own = robot_at.getsockname()[1], at.getsockname()[1]
     operator = LiveMobileOperator(
-        LiveMobileOperatorConfig(
-            ipr.model(), ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)
-        ),
+        LiveMobileOperatorConfig(ROBOT, ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)),
         Access(free=OPEN),
     )
     async with (
@@ -182,8 +181,8 @@ def test_an_arm_is_no_mobile_robot() -> None:
 
 
 def test_a_robot_finds_its_place_by_its_laser_where_there_is_something_to_see() -> None:
-    assert PacedConfig(ROOM).position == "laser"
-    assert PacedConfig(EMPTY).position == "fused"
-    assert PacedConfig(ROOM, position="truth").position == "truth"
+    assert PacedConfig(ROBOT, ROOM).position == "laser"
+    assert PacedConfig(ROBOT, EMPTY).position == "fused"
+    assert PacedConfig(ROBOT, ROOM, position="truth").position == "truth"
     with pytest.raises(InvalidValueError, match="odometry"):
-        PacedConfig(ROOM, position="stars")
+        PacedConfig(ROBOT, ROOM, position="stars")

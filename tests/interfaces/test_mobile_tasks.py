@@ -16,7 +16,6 @@ from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
 from interfaces.stream.session import News
 from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
-from robots.ipr.chassis import chassis
 from robots.onboard.journey import Goal
 from tests.interfaces.teleop.driving.rig import MODEL, Rig
 
@@ -33,7 +32,7 @@ class Office:
         self.rig = Rig(hold=True)
         self.told: list[News] = []
         file = None if path is None else JobFile(path)
-        self.desk = TaskDesk(self.rig.operator, ROOM, (chassis("ipr"), MODEL.limits), self.told.append, file)
+        self.desk = TaskDesk(self.rig.operator, ROOM, MODEL, self.told.append, file)
 
     def run(self, seconds: float) -> None:
         self.rig.run(seconds, lambda _: self.desk.turn())

@@ -19,7 +19,6 @@ import pytest
 from interfaces.runtime.physics import Event, PhysicsConfig, PhysicsProcess, ProcessEnded, References, Silent
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
-    BodyKind,
     Fault,
     FaultKind,
     Measurement,
@@ -30,10 +29,10 @@ from interfaces.runtime.physics_messages import (
     decode_news,
 )
 from interfaces.runtime.physics_process import ParentSocket, tick_body
-from interfaces.runtime.session import simulated_puma
 from interfaces.teleop import JointReference, RobotSite
+from robots.robot import EXACT
 from tests.interfaces.test_teleop import laboratory
-from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
+from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, ROBOT, TICK, motion, sampled, standing
 from vrs import Engine, JointTarget, MotionCommand, Timeline, WallClock
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -78,7 +77,7 @@ def test_what_a_site_foresees_is_what_it_finds_after_a_stall(profile: str, D: fl
 
 
 def configured(**options: Any) -> PhysicsConfig:
-    return PhysicsConfig(LIMITS, NOMINAL, **({"body": BodyKind.EXACT} | options))
+    return PhysicsConfig(ROBOT, NOMINAL, **({"body": EXACT} | options))
 
 
 def wait(physics: PhysicsProcess, clock: WallClock, until: Callable[[Event], bool], longest: float) -> list[Event]:
@@ -182,11 +181,11 @@ import numpy as np
 from interfaces.runtime.physics import *
 from interfaces.runtime.physics_messages import PhysicsReady
 from interfaces.teleop import JointReference
-from robots import puma560
+from robots import load
 from vrs.clock import WallClock
-model = puma560.model()
-q, clock = np.array(model.poses["nominal"]), WallClock(0.0)
-physics = PhysicsProcess(PhysicsConfig(model.limits, q, body="exact"), clock)
+robot = load("puma560")
+q, clock = np.array(robot.arm.poses["nominal"]), WallClock(0.0)
+physics = PhysicsProcess(PhysicsConfig(robot, q, body="exact"), clock)
 while not any(isinstance(e, PhysicsReady) for e in physics.poll(now=clock.now())):
     select.select([physics], [], [], 1.0)
 first, h = int(clock.now() / TICK) + 200, TICK * np.arange(1000)[:, None] * np.ones(6)
@@ -221,7 +220,7 @@ def test_the_death_of_the_parent_ends_it() -> None:
 
 def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) -> None:
     timeline = motion(1)
-    with PhysicsProcess(configured(body=BodyKind.PUMA560), clock) as physics:
+    with PhysicsProcess(configured(body="bullet"), clock) as physics:
         ready = next(
             e
             for e in wait(physics, clock, lambda e: isinstance(e, PhysicsReady), 60.0)
@@ -244,10 +243,10 @@ def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) ->
 @pytest.mark.parametrize("friction", [True, False])
 def test_a_puma_has_friction_if_that_is_asked_for(friction: bool) -> None:
     bounds: Any = (tuple(map(tuple, (LIMITS.q_min, LIMITS.q_max, LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max))),)
-    setup = PhysicsSetup(BodyKind.PUMA560, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
-    with tick_body(setup) as body, simulated_puma(friction=friction)(NOMINAL) as arm:
-        for made in (body, arm):
-            reality = made.arm.reality  # type: ignore[attr-defined]
+    setup = PhysicsSetup("puma560", "bullet", friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
+    with tick_body(setup) as body, ROBOT.body()(NOMINAL, friction=friction) as arm:
+        for made in (body.arm, arm):  # type: ignore[attr-defined]
+            reality = made.reality
             assert reality.friction is friction
         assert body.arm.reality.dt == 0.002  # type: ignore[attr-defined]
 
@@ -274,7 +273,7 @@ def test_a_fault_waits_until_the_parent_reads_and_measurements_do_not() -> None:
 
 def test_it_refuses_what_can_not_be_sent(clock: WallClock) -> None:
     with pytest.raises(InvalidValueError, match="joint"):
-        PhysicsConfig(LIMITS, NOMINAL + 100.0)
+        PhysicsConfig(ROBOT, NOMINAL + 100.0)
     with pytest.raises(InvalidValueError, match="every"):
         configured(every=0)
     with PhysicsProcess(configured(), clock) as physics:

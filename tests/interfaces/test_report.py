@@ -13,12 +13,12 @@ import pytest
 from interfaces.messages.recording import CommandPacket, RunEvent
 from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
-from interfaces.report.scene import revolute_chain, scene
+from interfaces.report.scene import chain_of, scene
 from interfaces.report.tables import time_lines
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import TwinRun
 from interfaces.teleop import Correction
-from robots import puma560
+from robots import load, puma560
 from tests.interfaces.recording.recorded import begin
 from vrs.ledger import Receipt, Status
 from vrs.model import Array
@@ -49,7 +49,7 @@ def make_run(title: str = "Sines", reason: str = "late", k: int = 401) -> TwinRu
     corrections = (Correction(12.0, 13.0, np.full(6, 0.1), reason),)
     events = (RunEvent(3.0, "payload", reason), RunEvent(13.0, "slowed", reason))
     return TwinRun(
-        puma560.model(), begin(title=title, seed=7, delay="thu"), t, play, curve(t), curve(t), real,
+        load("puma560"), begin(title=title, seed=7, delay="thu"), t, play, curve(t), curve(t), real,
         real, real, answers, answers, packets, messages, corrections, events,
     )  # fmt: skip
 
@@ -115,7 +115,8 @@ def test_a_summary_of_other_names_is_still_shown() -> None:
 
 def test_the_chain_rebuilds_the_models_links() -> None:
     model = puma560.model()
-    base, A = revolute_chain(model)
+    chain = chain_of(model)
+    base, *A = (np.reshape(X, (4, 4)).T for X in (chain["base"], *chain["chain"]))
     q = np.random.default_rng(3).uniform(-2, 2, 6)
     X = base
     for i in range(6):

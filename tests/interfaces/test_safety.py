@@ -22,7 +22,7 @@ from interfaces.runtime.tick_loop import TickLoop
 from interfaces.stream.access import Access
 from interfaces.teleop import RobotSiteConfig
 from interfaces.teleop.driving import DrivenConfig
-from robots import onboard
+from robots import load, onboard
 from robots.ipr.robot import place
 from robots.onboard import WatchdogConfig
 from tests.interfaces.live_rig import HALT, MODEL, NOMINAL, operator_here, robot_here, until
@@ -95,14 +95,14 @@ def test_what_the_diagrams_show_runs() -> None:
     assert serve - operators == set()
     # The body's process makes its loop so.
     limits = tuple(map(tuple, (MODEL.limits.q_min, MODEL.limits.q_max, *[MODEL.limits.qd_max] * 3)))
-    setup = PhysicsSetup("exact", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
+    setup = PhysicsSetup("", "exact", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
     with tick_body(setup) as body:
         loop = TickLoop(body, MODEL.limits, tuple(NOMINAL), tick=0.001, every=10, now=0.0)
         in_process = reachable([loop])
     assert arm - FUNCTIONS - robots - in_process == set()
     assert {"Watchdog", "SensorMonitor", "Engine"} <= robots
     assert "SensorMonitor" in in_process
-    body = PacedBody(PacedConfig(place("empty"), driven=DrivenConfig(watchdog=WatchdogConfig())))
+    body = PacedBody(PacedConfig(load("ipr"), place("empty"), driven=DrivenConfig(watchdog=WatchdogConfig())))
     robot = LiveRobot(body, Access(free={Role.SITE}))
     try:
         robot.host.site = body.new_site(robot.clock.now())

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from interfaces.runtime.physics_messages import (
     ROWS_MOST,
     Attach,
-    BodyKind,
     Close,
     Fault,
     FaultKind,
@@ -26,9 +25,10 @@ from interfaces.runtime.physics_messages import (
     decode_order,
     encode,
 )
-from interfaces.runtime.physics_process import ExactTicks
+from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import AHEAD_MOST, PAUSE, TickLoop
 from interfaces.teleop import JointReference
+from robots.robot import EXACT, ExactArm
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Status
 from vrs.errors import FormatError, InvalidValueError, VrsError
@@ -45,7 +45,7 @@ class Bench:
 
     def __init__(self, body: Any = None) -> None:
         self.loop = TickLoop(
-            ExactTicks() if body is None else body, LIMITS, tuple(NOMINAL), tick=TICK, every=1, now=0.0
+            BodyTicks(ExactArm()) if body is None else body, LIMITS, tuple(NOMINAL), tick=TICK, every=1, now=0.0
         )
         self.now = 0.0
         self.news: list[News] = []
@@ -283,7 +283,7 @@ def test_what_makes_no_sense_brings_it_to_rest() -> None:
         Rows(0, 420, False, bytes(143)),
         Rows(0, 420, False, bytes(145)),
         Rows(0, 420, False, bytes(144 * (ROWS_MOST + 1))),
-        PhysicsSetup(BodyKind.EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
+        PhysicsSetup("", EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
         Attach(-1.0),
     ):
         bench = Bench(Picky())
@@ -299,10 +299,13 @@ def test_what_makes_no_sense_brings_it_to_rest() -> None:
         decode_news(encode(Close()))
 
 
-class Picky(ExactTicks):
+class Picky(BodyTicks):
     """A body that minds its loads, and breaks when it's told to."""
 
     broken = False
+
+    def __init__(self) -> None:
+        super().__init__(ExactArm())
 
     def attach(self, mass: float) -> None:
         if mass <= 0:
@@ -311,7 +314,7 @@ class Picky(ExactTicks):
     def step(self, prepared: Any) -> Any:
         if self.broken:
             raise VrsError("the arm fell off")
-        return prepared
+        return super().step(prepared)
 
 
 def test_a_body_that_fails_is_told_and_ends_it() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from interfaces.link import Service, delay_profile
 from interfaces.runs.summary import CAUSES, Measures, attribute, measures, summarize, to_json
 from interfaces.runs.twin_run import fixed_offset
 from interfaces.runtime.plan import default_plan, parse_plan
-from interfaces.runtime.session import exact_arm, run_twins, run_without, simulated_puma
-from robots import puma560
+from interfaces.runtime.session import run_twins, run_without
+from robots import load
+from robots.robot import ExactArm, exact_arm
 from vrs import Status
 from vrs.errors import InvalidValueError
 
-model = puma560.model()
+robot = load("puma560")
+model = robot.arm
 PLAN = parse_plan(
     b"""{"issue": 0.5, "execute": 1.0, "move": [40, 60, -170, 0, 30, 0], "speed": 0.5}
 {"issue": 1.5, "move": [-30, 70, -150, 20, 40, 30], "speed": 0.6}
@@ -31,7 +34,7 @@ PLAN = parse_plan(
 def twins(profile, plan=PLAN, arm=exact_arm, seed=0, offset="fixed", service=Service.DATAGRAM):
     delay = delay_profile(profile)
     D = fixed_offset(offset, delay)
-    return run_twins(plan, model, delay, arm, seed=seed, offset=D, service=service)
+    return run_twins(plan, robot, delay, arm, seed=seed, offset=D, service=service)
 
 
 def told(run, *kinds):
@@ -127,9 +130,9 @@ def test_a_lost_message_is_told_and_repeated(tmp_path):
 
 
 def test_a_robot_that_cannot_follow_stops_and_the_run_ends():
-    class Stuck:
-        def follow(self, reference):
-            return np.tile(PLAN.start, (len(reference.q), 1))
+    class Stuck(ExactArm):
+        def follow(self, prepared):
+            return replace(super().follow(prepared), q=np.tile(PLAN.start, (len(prepared.q), 1)))
 
         def attach(self, mass):
             pass
@@ -175,10 +178,10 @@ def test_the_load_is_taken_when_the_robot_plays_its_time(offset):
 def test_the_body_runs_every_millisecond_in_step_with_its_timeline(offset):
     seen = []
 
-    class Spy:
-        def follow(self, reference):
+    class Spy(ExactArm):
+        def prepare(self, *reference):
             seen.append(reference)
-            return reference.q
+            return super().prepare(*reference)
 
         def attach(self, mass):
             seen.append(mass)
@@ -214,8 +217,8 @@ def test_the_simulated_arm_follows_and_feels_its_load():
         "plan.jsonl",
         model,
     )
-    loaded = measures(twins("none", plan, simulated_puma()))
-    free = measures(run_without(frozenset(CAUSES[:2]), plan, model, delay_profile("thu"), seed=0))
+    loaded = measures(twins("none", plan, robot.body()))
+    free = measures(run_without(frozenset(CAUSES[:2]), plan, robot, delay_profile("thu"), seed=0))
     assert np.degrees(loaded.joint_rms_timeline_rad) < 0.5
     assert loaded.joint_rms_timeline_rad > 1.15 * free.joint_rms_timeline_rad > 0
 

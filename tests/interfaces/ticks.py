@@ -6,12 +6,13 @@ from functools import cache
 
 import numpy as np
 
+import robots
 from interfaces.teleop import JointReference
-from robots import puma560
 from vrs import Engine, Insertion, JointTarget, MotionCommand, Timeline
 from vrs.model import Array
 
-MODEL = puma560.model()
+ROBOT = robots.load("puma560")
+MODEL = ROBOT.arm
 LIMITS = MODEL.limits
 NOMINAL = np.array(MODEL.poses["nominal"])
 TICK = 0.001

@@ -198,6 +198,7 @@ class Gantry:
     """Three prismatic joints along the axes: a model of another size, whose best times are known."""
 
     name = "gantry"
+    prismatic = (0, 1, 2)
     limits = Limits(np.full(3, -2.0), np.full(3, 2.0), np.array([1.0, 2.0, 3.0]), np.array([4.0, 4.0, 8.0]))
     poses = {"nominal": np.zeros(3)}  # noqa: RUF012
     tool_speed = 0.5

@@ -21,7 +21,7 @@ import numpy as np
 
 from vrs.commands import Profile
 from vrs.errors import PlanningError, UnresolvedError
-from vrs.model import Array, Limits, RobotModel
+from vrs.model import Array, Limits, RobotModel, for_people
 from vrs.notes import Note, NoteCode, Notes
 from vrs.planning import parabolic
 from vrs.planning.along import Samples, Traversal, sampled
@@ -269,11 +269,11 @@ def obstacle(path: Path, s: Array, q: Array, model: RobotModel, limits: Limits) 
         limits: Position limits.
     """
     every = np.append(np.arange(0, len(s) - 1, 2), len(s) - 1)
-    found = [_limit(path, s, q, limits), _singularity(path, s[every], q[every], model)]
+    found = [_limit(path, s, q, limits, model), _singularity(path, s[every], q[every], model)]
     return min((one for one in found if one is not None), default=(0.0, None))[1]
 
 
-def _limit(path: Path, s: Array, q: Array, limits: Limits) -> tuple[float, str] | None:
+def _limit(path: Path, s: Array, q: Array, limits: Limits, model: RobotModel) -> tuple[float, str] | None:
     excess = np.maximum(q - limits.q_max, limits.q_min - q)
     outside = np.flatnonzero((excess > _SLACK).any(1))
     if not len(outside):
@@ -284,8 +284,8 @@ def _limit(path: Path, s: Array, q: Array, limits: Limits) -> tuple[float, str] 
     where = float(s[i])
     if i and excess[i, j] > excess[i - 1, j]:
         where -= float((s[i] - s[i - 1]) * min(excess[i, j] / (excess[i, j] - excess[i - 1, j]), 1.0))
-    turn = f"{np.degrees(bound):.6g} deg"
-    return where, f"joint {j + 1} would pass its limit of {turn} at {path.course.place(where)}"
+    most, unit = for_people(j, bound, model.prismatic)
+    return where, f"joint {j + 1} would pass its limit of {most:.6g} {unit} at {path.course.place(where)}"
 
 
 def _singularity(path: Path, s: Array, q: Array, model: RobotModel) -> tuple[float, str] | None:
@@ -492,10 +492,10 @@ def _check_arrival(q: Array, task: _Task) -> Array:
         return wanted
     own, other = task.model.configuration(q), task.model.configuration(wanted)
     words = f", {own} instead of {other}" if own != other else ""
-    at, asked = np.degrees((q[j], wanted[j])).tolist()
+    (at, unit), (asked, _) = (for_people(j, float(x[j]), task.model.prismatic) for x in (q, wanted))
     raise PlanningError(
-        f"the line arrives at another solution of the pose: joint {j + 1} at {at:.6g} deg, "
-        f"asked for is {asked:.6g} deg{words}"
+        f"the line arrives at another solution of the pose: joint {j + 1} at {at:.6g} {unit}, "
+        f"asked for is {asked:.6g} {unit}{words}"
     )
 
 

@@ -6,7 +6,7 @@ those of a frame fixed to the last link.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -199,6 +199,11 @@ class Tooled:
     def limits(self) -> Limits:
         """The arm's."""
         return self.arm.limits
+
+    @property
+    def prismatic(self) -> Collection[int]:
+        """The arm's."""
+        return self.arm.prismatic
 
     @property
     def poses(self) -> Mapping[str, Array]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from itertools import accumulate, pairwise
-from math import copysign, degrees, hypot, sqrt
+from math import copysign, hypot, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from vrs.checks import finite, finite_array
 from vrs.commands import Frame
 from vrs.errors import InvalidValueError, PlanningError
-from vrs.model import Array, Limits, RobotModel
+from vrs.model import Array, Limits, RobotModel, for_people
 from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.parabolic import brake
@@ -800,7 +800,7 @@ def steer(
         raise InvalidValueError("frame", frame, "base or tool")
     if rates is not None and twist is None:
         u = finite_array("rates", rates, (n,), f"finite joint rates [rad/s], shape ({n},)")
-        return *_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits)
+        return *_by_rates(state, u, lasting, limits), _at_limit(state.q, u, limits, model)
     if twist is None or rates is not None:
         raise InvalidValueError("rates and twist", (rates, twist), "one of the two, the other None")
     given = finite_array("twist", twist, (6,), "a finite twist (v [m/s], w [rad/s]), shape (6,)")
@@ -844,7 +844,7 @@ def _by_twist(
     low, high = rates_to_limits(state.q, limits)
     blocked = bool((u < low).any() or (u > high).any())
     plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
-    hindrance = _at_limit(state.q, u, limits)
+    hindrance = _at_limit(state.q, u, limits, model)
     missed = asked - J[0] @ u
     slowed = share < _SLOWED or float(missed @ missed) > (1.0 - _SLOWED) ** 2 * float(asked @ asked)
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
@@ -855,7 +855,7 @@ def _by_twist(
     return *_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance
 
 
-def _at_limit(q: Array, u: Array, limits: Limits) -> str:
+def _at_limit(q: Array, u: Array, limits: Limits, model: RobotModel) -> str:
     """Say which joint a position limit keeps from moving at the rates u [rad/s]; empty where none does."""
     low, high = rates_to_limits(q, limits)
     most = np.where(u < 0.0, -low, high)
@@ -864,8 +864,9 @@ def _at_limit(q: Array, u: Array, limits: Limits) -> str:
     if left[joint] >= _SLOWED:
         return ""
     which, back = ("lower", "up") if u[joint] < 0.0 else ("upper", "down")
-    at = degrees(float((limits.q_min if u[joint] < 0.0 else limits.q_max)[joint]))
-    return f"joint {joint + 1} is at its {which} limit, {at:.0f}°: jog it {back}, or move back"
+    at, unit = for_people(joint, float((limits.q_min if u[joint] < 0.0 else limits.q_max)[joint]), model.prismatic)
+    where = f"{at:.0f}°" if unit == "deg" else f"{at:g} {unit}"
+    return f"joint {joint + 1} is at its {which} limit, {where}: jog it {back}, or move back"
 
 
 def _nearness(J: Array) -> Array:

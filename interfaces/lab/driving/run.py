@@ -31,11 +31,10 @@ from interfaces.teleop.architectures.compositions import (
     operator_surroundings,
     robot_surroundings,
 )
-from robots import ipr
 from robots.bullet.rooms import Room
 from robots.ipr.chassis import Senses
-from robots.ipr.robot import BareBody, MobileRobot
-from robots.onboard.driving import IPR_LIMITS, STAND, Posture
+from robots.ipr.robot import MobileRobot
+from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
 from vrs.model import Array
 
@@ -53,18 +52,16 @@ def make_robot(case: DriveCase, start: Posture, room: str | Room) -> MobileRobot
     """The real robot of a case."""
     senses = Senses() if case.architecture in SENSING else Senses(sonar=None)
     if case.position == "laser":
-        # The micro-robot's sits on its middle.
-        senses = replace(
-            senses, laser=LaserModel(forward=0.0, height=0.06) if case.robot == "micro" else LaserModel()
-        )
+        senses = replace(senses, laser=case.real[0].device(LaserModel) or LaserModel())
     # The seed's own streams: of the robot, of the network, of the operator.
     rng = np.random.default_rng([case.seed, 1])
     where = room or None
-    if case.robot == "bare":
-        return BareBody("ipr", start, room=where, reality=case.reality, rng=rng, senses=senses)
-    from robots.ipr.body import MobileBody
-
-    return MobileBody(case.robot, start, room=where, reality=case.reality, rng=rng, senses=senses)
+    robot, body = case.real
+    limits = robot.base.limits
+    made: MobileRobot = robot.body(body)(
+        start, room=where, reality=case.reality, rng=rng, senses=senses, limits=limits
+    )
+    return made
 
 
 def run(case: DriveCase, driver: Operator | None = None, witness: Witness | None = None) -> DriveRun:
@@ -96,14 +93,14 @@ class _DrivingRun:
         self, case: DriveCase, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
     ) -> None:
         self._case, self._driver, self._link, self._body = case, driver, link, body
-        model = ipr.model("micro" if case.robot == "micro" else "ipr", period=case.constants.period)
+        model = replace(case.real[0].base, period=case.constants.period)
         made = controller(case.architecture, driver.start, case.constants)
         senses = case.architecture in SENSING
-        there = operator_surroundings(body.room, body.chassis, driver.start, model) if senses else None
+        there = operator_surroundings(body.room, driver.start, model) if senses else None
         here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
         self._site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)
         position = POSITIONS[case.position](body)
-        self._robot = ArchitectureRobotSite(made, position, IPR_LIMITS, period=CONTROL, surroundings=here)
+        self._robot = ArchitectureRobotSite(made, position, body.limits, period=CONTROL, surroundings=here)
         self._offset = made if isinstance(made, TimelineController) else None
         self._waiting = 0
         """Packets on their way that were sent while the operator drove."""

@@ -159,10 +159,10 @@ def _drawn(
     Raises:
         InvalidValueError: If the room has none.
     """
-    whole = route_map(seen_all(room if truth is None else truth), IPR)
+    whole = route_map(seen_all(room if truth is None else truth), IPR.footprint)
     # Where it begins the robot must have room as things are at first.
-    first = route_map(seen_all(room), IPR)
-    mapped = route_map(room, IPR)
+    first = route_map(seen_all(room), IPR.footprint)
+    mapped = route_map(room, IPR.footprint)
     for _ in range(_TRIES):
         start, goal = _place(room, rng), _place(room, rng)
         free = first.is_free(start) and whole.is_free(goal) and whole.is_free(start)

@@ -134,7 +134,7 @@ def measure(study: Study, case: str) -> MeasuredTrip:
     chosen = setting(group, study.seed, int(number))
     begin, end = chosen.start[:2], (chosen.goal.x, chosen.goal.y)
     # A disc as wide as the robot, with what its routes keep free on either side.
-    radius = route_config(IPR).half_width + route_config(IPR).margin
+    radius = route_config(IPR.footprint).half_width + route_config(IPR.footprint).margin
     mapped, true = (
         Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
     )

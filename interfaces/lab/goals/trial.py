@@ -147,7 +147,7 @@ def travel(setting: TripSetting) -> Trip:
         begun, goal = body.time, setting.goal
         pilot.go(goal)
         journey = pilot.journey
-        planned = route_map(setting.room, body.chassis).route(body.truth[:2], (goal.x, goal.y))
+        planned = route_map(setting.room, body.chassis.footprint).route(body.truth[:2], (goal.x, goal.y))
         while journey.state in GOING:
             pilot.step()
         x, y, theta = body.truth

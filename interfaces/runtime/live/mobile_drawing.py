@@ -16,7 +16,8 @@ from interfaces.teleop.driving import DrivingOperator
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
 from robots.onboard.routes import Point
-from vrs.mobile import ArcPiece, ArcTimeline, Grid, MobileModel, wrapped
+from robots.robot import Robot
+from vrs.mobile import ArcPiece, ArcTimeline, Grid, wrapped
 from vrs.mobile.model import advanced, braking
 
 APART = 0.04
@@ -85,17 +86,17 @@ def reality(operator: DrivingOperator, now: float) -> tuple[tuple[float, float, 
 class MobileDrawing:
     """Draws an operator's site."""
 
-    def __init__(self, model: MobileModel, start: Posture, room: Room, grid: Grid) -> None:
+    def __init__(self, robot: Robot, start: Posture, room: Room, grid: Grid) -> None:
         """Make the scene.
 
         Args:
-            model: The robot.
+            robot: A mobile robot.
             start: Where both stand at first.
             room: Where they drive.
             grid: Cells of the virtual environment.
         """
-        self._model = model
-        self.scene = TwinScene(model, start, room=None if room is EMPTY else room, grid=grid)
+        self._model = robot.base
+        self.scene = TwinScene(robot, start, room=None if room is EMPTY else room, grid=grid)
         """What all viewers see, once it's dressed."""
         self._ways: dict[str, _DrivenTrace] = {}
         self._drive = -1

@@ -39,12 +39,11 @@ from interfaces.teleop.driving import DriveLine, DrivingOperator
 from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
-from robots.ipr.chassis import chassis
 from robots.onboard import LossPolicy
 from robots.onboard.driving import Posture
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
+from robots.robot import Robot
 from vrs.clock import WallClock, seconds_since_1970
-from vrs.mobile import MobileModel
 
 PATIENCE = 6.0
 """So long after a lease ended the real robot may take to say that it stands [s]."""
@@ -54,7 +53,8 @@ PATIENCE = 6.0
 class LiveMobileOperatorConfig:
     """An operator's site."""
 
-    model: MobileModel
+    base: Robot
+    """Which mobile robot."""
     room: Room
     """Where the robot drives: both sites have the same."""
     robot: str
@@ -89,8 +89,8 @@ class LiveMobileOperator(LeasedRobot, Workers):
         """
         self.config = config
         self.clock = WallClock()
-        start = Posture(*config.room.start)
-        self.operator = DrivingOperator(config.model, start, now=0.0, around=self._around)
+        start, model = Posture(*config.room.start), config.base.base
+        self.operator = DrivingOperator(model, start, now=0.0, around=self._around)
         self.line = DriveLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -100,16 +100,15 @@ class LiveMobileOperator(LeasedRobot, Workers):
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
         hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
-        self.site = DriveSite(self.operator, config.model, room=config.room.name)
+        self.site = DriveSite(self.operator, model, room=config.room.name)
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, lambda _, __: self._turning.soon())
         self.hub = Hub(
             self.site, lease, access, self, config=hub, emulation=self.emulation, welcome=self.site.welcome,
             workers=self,
         )  # fmt: skip
-        body = chassis("ipr"), config.model.limits
-        self.desk = TaskDesk(self.operator, config.room, body, self.hub.tell, config.jobs, config.arm)
+        self.desk = TaskDesk(self.operator, config.room, model, self.hub.tell, config.jobs, config.arm)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self.drawing = MobileDrawing(config.model, start, config.room, grid_of(config.room, start))
+        self.drawing = MobileDrawing(config.base, start, config.room, grid_of(config.room, start))
         self._view = view_routes(self.drawing.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self.media = None if config.camera is None else self._media(config.camera)
         """Camera, voice and screen; None where there's no camera."""
@@ -154,11 +153,11 @@ class LiveMobileOperator(LeasedRobot, Workers):
     def _around(self, start: Posture) -> OperatorSurroundings | None:
         """What keeps the virtual robot out of the walls that are known."""
         room = self.config.room
-        return None if room is EMPTY else operator_surroundings(room, chassis("ipr"), start, self.config.model)
+        return None if room is EMPTY else operator_surroundings(room, start, self.config.base.base)
 
     def _unfit(self, robot: Attached) -> str:
         """Why a robot isn't the one that is driven here; empty if it is."""
-        model, room = self.config.model.name, self.config.room.name
+        model, room = self.config.base.name, self.config.room.name
         if robot.robot != model:
             return f"it's a {robot.robot}, and this site drives an {model}"
         return (
@@ -167,7 +166,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
 
     async def _draw(self) -> None:
         """Draw both robots for those who look, once their bodies are made."""
-        self.drawing.scene.dress(await asyncio.to_thread(bodies, self.config.model))
+        self.drawing.scene.dress(await asyncio.to_thread(bodies, self.config.base))
         while True:
             await asyncio.sleep(SHOW)
             self.drawing.follow(self.operator)

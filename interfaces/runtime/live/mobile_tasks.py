@@ -26,14 +26,13 @@ from interfaces.messages.mobile import Plan, Seen, Tasks
 from interfaces.stream.session import News
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.halt import HaltCause
+from robots.base import MobileBase
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Chassis
 from robots.ipr.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteMap
 from vrs.errors import FormatError
-from vrs.mobile import DriveLimits
 
 LARGEST: Final = 24_000
 """A list that's longer, as a file has it, doesn't go over the link [byte]."""
@@ -52,7 +51,7 @@ class TaskDesk:
         self,
         operator: DrivingOperator,
         room: Room,
-        body: tuple[Chassis, DriveLimits],
+        base: MobileBase,
         tell: Callable[[News], None],
         file: JobFile | None = None,
         arm: Callable[[ArmJob], float | str | None] = lambda _: None,
@@ -62,12 +61,12 @@ class TaskDesk:
         Args:
             operator: Has the robot do it.
             room: Where the robot drives.
-            body: What it is, and how fast it drives.
+            base: What it is.
             tell: Lets every client know.
             file: Where the list is kept; nowhere unless given.
             arm: Says how long a program takes [s], why it'd fail, or None where nobody knows; see `dry_run`.
         """
-        self._operator, self._room, self._body, self._tell = operator, room, body, tell
+        self._operator, self._room, self._base, self._tell = operator, room, base, tell
         self._file, self._arm = file, arm
         self.problem = ""
         """What is wrong with the file; empty if nothing is."""
@@ -100,7 +99,7 @@ class TaskDesk:
 
     def plan(self) -> Plan:
         """The known map."""
-        room, outline = self._room, outline_of(self._body[0])
+        room, outline = self._room, outline_of(self._base.body)
         rings = tuple(tuple((round(x, 3), round(y, 3)) for x, y in ring) for ring in known_outlines(room))
         robot = outline.front, outline.rear, 2 * outline.half_width
         return Plan((room.length, room.width), rings, room.via, robot)
@@ -157,8 +156,8 @@ class TaskDesk:
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
         if self._roads is None:
-            self._roads = route_map(self._room, self._body[0])
-        return dry_run(jobs, posture, self._roads, self._body[1], arm=self._arm)
+            self._roads = route_map(self._room, self._base.body)
+        return dry_run(jobs, posture, self._roads, self._base.limits, arm=self._arm)
 
     @property
     def _doing(self) -> Doing:

@@ -37,10 +37,11 @@ from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease
+from robots.robot import Robot
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.commands import Stop
 from vrs.errors import InvalidValueError, VrsError
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 
 SHOW = 1.0 / 60.0
 """Time between two frames of the view [s]."""
@@ -56,7 +57,8 @@ GONE = 2.0
 class LiveOperatorConfig:
     """An operator's site."""
 
-    model: RobotModel
+    arm: Robot
+    """Which arm."""
     q: Array
     """Where the virtual robot stands at first [rad], (n,); it goes to where the real one is met."""
     robot: str
@@ -93,11 +95,10 @@ class LiveOperator(LeasedRobot):
             RecordingError: If it's to be recorded and the file can't be made.
         """
         self.config = config
-        warm(config.model, config.q)
+        model = config.arm.arm
+        warm(model, config.q)
         self.clock = WallClock()
-        self.operator = OperatorSite(
-            config.model, config.q, now=0.0, config=config.site, halted=Halt(HaltCause.NOT_MET)
-        )
+        self.operator = OperatorSite(model, config.q, now=0.0, config=config.site, halted=Halt(HaltCause.NOT_MET))
         self.site = Site(self.operator.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self.recorder: LiveRecorder | None = None
@@ -105,7 +106,7 @@ class LiveOperator(LeasedRobot):
         self._recording_changes, self._closed = asyncio.Lock(), False
         if config.recording is not None:
             began = seconds_since_1970() - self.clock.now()
-            self.recorder = LiveRecorder(config.recording, self.line, config.model, seed=config.seed, began=began)
+            self.recorder = LiveRecorder(config.recording, self.line, model, seed=config.seed, began=began)
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -118,7 +119,7 @@ class LiveOperator(LeasedRobot):
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         self.hub = Hub(self.site, lease, access, self, config=hub, emulation=self.emulation)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self.scene = TwinScene(config.model)
+        self.scene = TwinScene(config.arm)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self._wants_resume = self._ending = False
         self._shown: tuple[Report | None, bool, str] = (None, False, "")
@@ -149,7 +150,7 @@ class LiveOperator(LeasedRobot):
 
     async def _draw(self) -> None:
         """Draw both robots for those who look, once their bodies are made."""
-        self.scene.dress(await asyncio.to_thread(bodies, self.config.model))
+        self.scene.dress(await asyncio.to_thread(bodies, self.config.arm))
         while True:
             await asyncio.sleep(SHOW)
             if not self.scene.readers:
@@ -172,7 +173,7 @@ class LiveOperator(LeasedRobot):
                 raise InvalidValueError("recording", what.path.name, "begun once the other one has ended")
             now, config = self.clock.now(), self.config
             recorder = LiveRecorder(
-                what, self.line, config.model, seed=config.seed, began=seconds_since_1970(), now=now
+                what, self.line, config.arm.arm, seed=config.seed, began=seconds_since_1970(), now=now
             )
             try:
                 await asyncio.to_thread(recorder.open)
@@ -249,7 +250,7 @@ class LiveOperator(LeasedRobot):
 
     def _unfit(self, robot: Attached) -> str:
         """Why a robot isn't the one that is driven here; empty if it is."""
-        name = self.config.model.name
+        name = self.config.arm.name
         return "" if robot.robot == name else f"it's a {robot.robot}, and this site drives a {name}"
 
     def _end_lease(self, now: float) -> None:

@@ -32,12 +32,13 @@ from interfaces.teleop.driving import (
     NavigatorPilot,
 )
 from robots.bullet.rooms import Room
-from robots.ipr.body import MobileBody
 from robots.ipr.chassis import Senses
+from robots.ipr.robot import MobileRobot
 from robots.onboard import WatchdogConfig
-from robots.onboard.driving import IPR_LIMITS, Posture
+from robots.onboard.driving import Posture
 from robots.onboard.following import SoundPosition
 from robots.onboard.laser import LaserModel
+from robots.robot import Robot
 from vrs.checks import one_of
 from vrs.clock import WallClock
 from vrs.model import Array
@@ -51,6 +52,8 @@ _COUNTED = 1200
 class PacedConfig:
     """A mobile robot, and how its site behaves."""
 
+    robot: Robot
+    """Which mobile robot."""
     room: Room
     """Where it drives; it stands at first where the room says."""
     architecture: str = "timeline"
@@ -90,11 +93,12 @@ class PacedBody(LiveBody):
         Args:
             config: The robot.
         """
-        self.config, self.name, self.watchdog = config, "ipr", config.driven.watchdog
+        self.config, self.name, self.watchdog = config, config.robot.name, config.driven.watchdog
         self.about = {"architecture": config.architecture, "room": config.room.name}
-        senses = Senses(laser=LaserModel())
+        senses = Senses(laser=config.robot.device(LaserModel) or LaserModel())
         rng = np.random.default_rng(config.seed)
-        self.body = MobileBody("ipr", room=config.room, rng=rng, senses=senses)
+        limits = config.robot.base.limits
+        self.body: MobileRobot = config.robot.body()(room=config.room, rng=rng, senses=senses, limits=limits)
         body, position = self.body, POSITIONS[config.position](self.body)
         self._position = SoundPosition(position, lambda: body.time)
         # The first look of its senses, before anybody waits for it.
@@ -177,7 +181,7 @@ class PacedBody(LiveBody):
         return DrivenRobot(
             self._architecture,
             self._position,
-            IPR_LIMITS,
+            body.limits,
             now=t,
             world=lambda: body.time,
             config=driven,
@@ -192,7 +196,7 @@ class PacedBody(LiveBody):
         around = None
         if config.architecture in SENSING:
             around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
-        return ArchitectureRobotSite(made, self._position, IPR_LIMITS, period=CONTROL, surroundings=around)
+        return ArchitectureRobotSite(made, self._position, body.limits, period=CONTROL, surroundings=around)
 
     @override
     def decided(self) -> None:

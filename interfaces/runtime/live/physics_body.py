@@ -20,7 +20,7 @@ from interfaces.runtime.physics import TICK, Event, Feeder, PhysicsConfig, Physi
 from interfaces.runtime.physics_messages import Fault, Measurement
 from interfaces.teleop import RobotHost, RobotHostConfig
 from vrs.clock import WallClock
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 
 
 class PhysicsBody(LiveBody):
@@ -29,17 +29,17 @@ class PhysicsBody(LiveBody):
     host: RobotHost
     ready = False
 
-    def __init__(self, model: RobotModel, physics: PhysicsConfig, host: RobotHostConfig | None = None) -> None:
+    def __init__(self, physics: PhysicsConfig, host: RobotHostConfig | None = None) -> None:
         """Take the clock from here on.
 
         Args:
-            model: The robot.
-            physics: Its body, and where it stands.
+            physics: The robot, its body, and where it stands.
             host: How its end of the connection behaves.
         """
         host = RobotHostConfig() if host is None else host
+        model = physics.robot.arm
         warm(model, physics.q)
-        self.name, self.offset, self.watchdog = model.name, host.site.fixed_offset, host.site.watchdog
+        self.name, self.offset, self.watchdog = physics.robot.name, host.site.fixed_offset, host.site.watchdog
         self.clock = WallClock()
         self.host = RobotHost(model, physics.q, now=self.clock.now(), config=host, seed=secrets.randbelow(2**32))
         self._config = physics

@@ -30,7 +30,7 @@ from vrs.errors import VrsError
 from vrs.model import Array, RobotModel
 
 _AWAY = 0.05
-"""How far the joints of an engine that nobody sees are moved [rad]."""
+"""How far the joints of an engine that nobody sees are moved [rad, m], at most a quarter of their range."""
 
 
 def warm(model: RobotModel, q: Array) -> None:
@@ -43,7 +43,7 @@ def warm(model: RobotModel, q: Array) -> None:
     clock = ManualClock(0.0)
     engine = Engine(model, q=q, clock=clock)
     middle = 0.5 * (model.limits.q_min + model.limits.q_max)
-    near = q + _AWAY * np.sign(middle - q)
+    near = q + np.minimum(_AWAY, 0.25 * (model.limits.q_max - model.limits.q_min)) * np.sign(middle - q)
     rates = np.full(len(q), 0.05)
     for command in (
         MotionCommand(JointTarget(near)),

@@ -42,6 +42,11 @@ export class Chain {
     this.tool = tool;
   }
 
+  /** Whether a joint is prismatic: its values are in m where others' are in rad. */
+  slides(k) {
+    return this.screws[k].slice(0, 3).every((part) => part === 0);
+  }
+
   /** Poses of the base and of the links at q. */
   links(q) {
     const poses = [this.home[0]];

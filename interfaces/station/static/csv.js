@@ -7,14 +7,19 @@ const UNITS = [
   [/^(angle|real|reference|error)_/, "_rad"],
 ];
 
-function headed(name) {
+function headed(name, slides) {
+  const joint = /^(?:real|reference|error_[a-z]+)_(\d+)$/.exec(name);
+  if (joint && slides(joint[1] - 1)) return name + "_m";
   return name + (UNITS.find(([pattern]) => pattern.test(name))?.[1] ?? "");
 }
 
-/** A table's rows as text, a piece at a time so that nothing waits for it; what isn't known is left empty. */
-export async function textOf(table) {
+/**
+ * A table's rows as text, a piece at a time so that nothing waits for it; what isn't known is left empty.
+ * @param {(joint: number) => boolean} slides whether a joint is prismatic, from 0
+ */
+export async function textOf(table, slides = () => false) {
   const columns = table.names.map((name) => table.column(name).slice());
-  const parts = [table.names.map(headed).join(",") + "\n"];
+  const parts = [table.names.map((name) => headed(name, slides)).join(",") + "\n"];
   const count = columns[0].length;
   for (let from = 0; from < count; from += AT_ONCE) {
     let text = "";

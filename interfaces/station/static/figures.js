@@ -31,7 +31,7 @@ export function figuresOf({ samples, from, until, paths }) {
       ["angle", of(`angle_${basis}`), "deg", DEGREES],
     ];
     for (let j = 1; j <= samples.joints; j++)
-      errors.push([`joint ${j}`, of(`error_${basis}_${j}`), "deg", DEGREES]);
+      errors.push([`joint ${j}`, of(`error_${basis}_${j}`), ...(samples.chain.slides(j - 1) ? ["mm", 1e3] : ["deg", DEGREES])]);
     for (const [name, { rms, max }, ...unit] of errors)
       rows.push(row(`${name} rms, ${basis}`, rms, ...unit), row(`${name} max, ${basis}`, max, ...unit));
   }

@@ -24,9 +24,20 @@ function ofTable(columns, factor, words) {
   };
 }
 
-function worst(row) {
-  const joint = row.reduce((best, x, k) => (Math.abs(x) > Math.abs(row[best]) ? k : best), 0);
-  return `worst: joint ${joint + 1}, ${figure(row[joint], 3)} deg`;
+/** The plot of errors of some joints, counted from 1. */
+function jointErrors(joints, more) {
+  const words = (row) => {
+    const worst = row.reduce((best, x, k) => (Math.abs(x) > Math.abs(row[best]) ? k : best), 0);
+    return `worst: joint ${joints[worst]}, ${figure(row[worst], 3)} ${more.unit}`;
+  };
+  return {
+    ...more,
+    based: true,
+    open: true,
+    note: "Real minus virtual, joint by joint.",
+    lines: joints.map((j) => line(`${j}`, `--j${((j - 1) % 6) + 1}`, JOINT_DASHES[(j - 1) % 6])),
+    ...ofTable((basis) => joints.map((j) => `error_${basis}_${j}`), more.factor, words),
+  };
 }
 
 function attributed([offset, link, servo], get) {
@@ -38,22 +49,18 @@ function attributed([offset, link, servo], get) {
 /**
  * The plots. `data` makes what is drawn of a window, `words` tells one moment; `least` is the shortest axis, in the
  * plot's unit, `zero` says that it begins at 0. `based` plots depend on where is compared.
- * @param {number} n joints
+ * @param {import("./chain.js").Chain} chain
  */
-export function graphs(n) {
-  const joints = Array.from({ length: n }, (_, k) => k + 1);
+export function graphs(chain) {
+  const joints = Array.from(chain.screws, (_, k) => k + 1);
+  const [sliding, turning] = [true, false].map((slides) => joints.filter((j) => chain.slides(j - 1) === slides));
   return [
-    {
-      name: "joint-error",
-      title: "Joint error",
-      unit: "deg",
-      least: 0.02,
-      based: true,
-      open: true,
-      note: "Real minus virtual, joint by joint.",
-      lines: joints.map((j) => line(`${j}`, `--j${((j - 1) % 6) + 1}`, JOINT_DASHES[(j - 1) % 6])),
-      ...ofTable((basis) => joints.map((j) => `error_${basis}_${j}`), DEGREES, worst),
-    },
+    ...(turning.length
+      ? [jointErrors(turning, { name: "joint-error", title: "Joint error", unit: "deg", factor: DEGREES, least: 0.02 })]
+      : []),
+    ...(sliding.length
+      ? [jointErrors(sliding, { name: "slide-error", title: "Error of prismatic joints", unit: "mm", factor: 1e3, least: 0.1 })]
+      : []),
     {
       name: "tool-error",
       title: "Tool error",

@@ -1,5 +1,5 @@
 // Jogging: joints and tool by buttons that are held, by keys, by the stick on the page and by a gamepad; named poses.
-import { degrees, h, isTyping, write } from "./dom.js";
+import { degrees, figure, h, isTyping, write } from "./dom.js";
 import { held, needs, Speed } from "./handling.js";
 import { mountPad } from "./pad.js";
 import { steering } from "./steer.js";
@@ -131,7 +131,7 @@ export function mount(station, box) {
     const q = station.shared.pane?.shown ?? (session.now === null ? null : session.timeline?.joints(session.now));
     if (!q) return;
     joints.forEach(({ value, bar, low, high }, k) => {
-      write(value, degrees(q[k]));
+      write(value, station.chain.slides(k) ? `${figure(q[k], 3)} m` : degrees(q[k]));
       bar.style.left = `${Math.max(0, Math.min(100, (100 * (q[k] - low)) / (high - low)))}%`;
     });
   }, 100);

@@ -48,7 +48,7 @@ class Plots {
     this.session = station.session;
     this.samples = new Samples(station);
     this.happenings = new Happenings(station);
-    this.charts = graphs(this.samples.joints).map((graph) => new Chart(graph));
+    this.charts = graphs(this.samples.chain).map((graph) => new Chart(graph));
     this.figures = new Figures();
     this.parts = [...this.charts, this.figures];
     this.head = new PlotHead(SPANS, { chosen: () => this.choose(), save: () => this.save() });
@@ -235,7 +235,7 @@ class Plots {
   }
 
   async save() {
-    const parts = await textOf(this.samples.table);
+    const parts = await textOf(this.samples.table, (joint) => this.samples.chain.slides(joint));
     save(parts, `vrs-plots-${Math.round(this.session.now ?? 0)}s.csv`);
     this.station.announce(`${this.samples.table.length} samples saved.`);
   }

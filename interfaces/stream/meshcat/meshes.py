@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from interfaces.clients.appearance import link_shapes
-from vrs.mobile import MobileModel
-from vrs.model import Array, RobotModel
+from robots.robot import Robot
+from vrs.model import Array
 
 if TYPE_CHECKING:
     from robots.solids import LinkShape
@@ -41,9 +40,9 @@ class Bodies(NamedTuple):
     """Lowest point of the base in its frame [m]; 0 for a robot without shapes."""
 
 
-def bodies(model: RobotModel | MobileModel) -> Bodies:
+def bodies(robot: Robot) -> Bodies:
     """Make the meshes of a robot; the first time that takes a second, most of it to load trimesh."""
-    shapes = link_shapes(model)
+    shapes = robot.shapes()
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
     return Bodies(tuple(shaded(shape) for shape in shapes), floor)
 

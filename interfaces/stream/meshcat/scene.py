@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece
 from interfaces.stream.meshcat.meshes import Bodies
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.stream.meshcat.room import DrawnRoom
+from robots.robot import Display, Robot
 from vrs.checks import finite_array, number_in
-from vrs.mobile import ArcTimeline, Grid, MobileModel
+from vrs.mobile import ArcTimeline, Grid
 from vrs.model import Array, RobotModel, frozen_array
 from vrs.timeline import Timeline
 
@@ -54,7 +53,7 @@ class TwinScene(Nodes):
 
     def __init__(
         self,
-        model: RobotModel | MobileModel,
+        robot: Robot,
         start: ArrayLike | None = None,
         *,
         looks: Bodies | None = None,
@@ -65,10 +64,10 @@ class TwinScene(Nodes):
         """Make the scene, with both robots at the start and only the virtual one shown.
 
         Args:
-            model: The robot; an arm that has no shapes is shown by its frames and traces.
+            robot: What both are; an arm that has no shapes is shown by its frames and traces.
             start: Where both begin: joints [rad], (n,), the first of an arm's named poses unless given; of a mobile
                 robot its posture (x, y, θ) [m, m, rad], (3,).
-            looks: `bodies` of the model; unless given, nothing is to be seen until `dress`.
+            looks: `bodies` of the robot; unless given, nothing is to be seen until `dress`.
             room: See `DrawnRoom`; so are `grid` and `extent`.
             grid: Of the cells of the virtual environment.
             extent: What is to be seen of the floor.
@@ -79,19 +78,18 @@ class TwinScene(Nodes):
         from interfaces.stream.meshcat import objects
 
         super().__init__()
-        self._model, self._objects = model, objects
+        self._robot, self._objects = robot, objects
         self._links: Callable[[ArrayLike], Array]
         self._surroundings = room, grid, extent
         self._room: DrawnRoom | None = None
-        if isinstance(model, MobileModel):
-            from robots.ipr.chassis import chassis
-
-            n, self._length = 3, chassis(getattr(model, "kind", "ipr")).length
-            self._links = partial(parts_at, model)
+        if robot.is_base:
+            n, self._length = 3, robot.base.body.length
+            self._links = robot.placed
             tool: ArrayLike = (0.0, 0.0, _HEIGHTS["committed"] * min(self._length / 0.45, 1.0))
         else:
+            model = robot.arm
             n, self._length = model.limits.dof, _USUAL
-            self._links, tool = model.links, _tool_of(model)
+            self._links, tool = model.links, robot.tool
             if start is None:
                 start = next(iter(model.poses.values()), 0.5 * (model.limits.q_min + model.limits.q_max))
         self.tool = frozen_array(tool)
@@ -111,15 +109,16 @@ class TwinScene(Nodes):
         """Show the robots from now on; once.
 
         Args:
-            looks: From `bodies` of the scene's model, which takes its time and may be asked for in a thread.
+            looks: From `bodies` of the scene's robot, which takes its time and may be asked for in a thread.
         """
         assert not self._poses
-        model, objects, meshes = self._model, self._objects, looks.meshes
+        objects, meshes = self._objects, looks.meshes
         rest = np.asarray(self._links(self._start))
         rods: list[Array | None] = []
-        if isinstance(model, MobileModel):
+        if self._robot.is_base:
             self._room = DrawnRoom(self, self._start, *self._surroundings)
         else:
+            model = self._robot.arm
             self.put_property(ROOT, "box", _box(model, looks.floor))
             # Below the floor by a hair: no stripes where a foot stands on it.
             self.put_transform("/Grid", _at(0.0, 0.0, looks.floor - 0.001))
@@ -188,14 +187,15 @@ class TwinScene(Nodes):
             self.wake()
 
     def say(self, text: str) -> None:
-        """Show a message on the real robot's screen; an empty one clears it."""
+        """Show a message on the real robot's display, if it has one; an empty one clears it."""
+        display = self._robot.device(Display)
+        if display is None:
+            return
         path = f"{ROOT}/real/body/0/screen"
         if text:
-            from robots.ipr.shapes import SCREEN_SIZE, screen_pose
-
-            X = screen_pose()
+            X = display.pose()
             X[:3, 3] += SCREEN_LIFT * X[:3, 0]
-            self.put_object(path, self._objects.sign(path, self._objects.text_picture(text), SCREEN_SIZE, X))
+            self.put_object(path, self._objects.sign(path, self._objects.text_picture(text), display.size, X))
         self.put_property(path, "visible", bool(text))
         self.wake()
 
@@ -204,9 +204,9 @@ class TwinScene(Nodes):
 
     def _tool_at(self, q: Array) -> Array:
         """Where the tool is [m], (k, 3), at joints or postures (k, n)."""
-        if isinstance(self._model, MobileModel):
+        if self._robot.is_base:
             return np.column_stack([q[:, :2], np.full(len(q), self.tool[2])])
-        X = np.asarray(self._model.forward(q))
+        X = np.asarray(self._robot.arm.forward(q))
         points: Array = X[:, :3, :3] @ self.tool + X[:, :3, 3]
         return points
 
@@ -278,14 +278,6 @@ class TwinScene(Nodes):
                 points = np.array([point for _, point in trail])
                 self.put_object(path, self._objects.trace(path, points, COLOURS[twin]))
             self.put_property(path, "visible", len(trail) > 1)
-
-
-def _tool_of(model: RobotModel) -> ArrayLike:
-    if model.name == "puma560":
-        from robots.puma560.parameters import FLANGE
-
-        return (0.0, 0.0, FLANGE)
-    return (0.0, 0.0, 0.0)
 
 
 def _at(x: float, y: float, z: float) -> Array:

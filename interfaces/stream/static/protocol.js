@@ -390,7 +390,7 @@ function map(x, where) {
  * @property {string} [field] text of up to 200 characters (empty). Of an `Impair`: which of `delay`, `loss` and `service` it's about; empty where it's none of them.
  */
 /**
- * Joint limits, each of shape (n,).
+ * Joint limits, each of shape (n,); of prismatic joints in m for rad.
  * @typedef {object} Limits
  * @property {Array<number>} q_min joints. Lowest position [rad].
  * @property {Array<number>} q_max joints. Highest position [rad], above q_min.

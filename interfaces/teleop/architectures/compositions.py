@@ -20,8 +20,8 @@ from interfaces.teleop.architectures.controllers import (
 )
 from interfaces.teleop.architectures.sites import DriveController, PositionSource
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings, Sonar
+from robots.base import MobileBase
 from robots.bullet.rooms import EMPTY, Room
-from robots.ipr.chassis import Chassis
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.model import CELL, CELLS
 from robots.ipr.navigation import mounts_of, outline_of
@@ -33,7 +33,7 @@ from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, Yielding
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
 from vrs.checks import number_in, one_of, validated, within
-from vrs.mobile import Avoidance, Grid, MobileModel, VirtualEnvironment
+from vrs.mobile import Avoidance, Grid, VirtualEnvironment
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,20 +144,19 @@ def grid_of(room: Room, start: Posture) -> Grid:
     return Grid((m, n), CELL)
 
 
-def operator_surroundings(room: Room, chassis: Chassis, start: Posture, model: MobileModel) -> OperatorSurroundings:
+def operator_surroundings(room: Room, start: Posture, model: MobileBase) -> OperatorSurroundings:
     """The virtual environment with the room's known map, and what keeps the virtual robot out of it.
 
     Args:
         room: Where the real robot drives.
-        chassis: Its size.
         start: Where both robots begin.
         model: The virtual robot.
     """
     grid = grid_of(room, start)
     known = _known(room, grid, 0.0)
     environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
-    outline = outline_of(chassis)
-    radius = math.hypot(max(outline.front, outline.rear), chassis.width / 2) + MARGIN
+    outline = outline_of(model.body)
+    radius = math.hypot(max(outline.front, outline.rear), model.body.width / 2) + MARGIN
     return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
 
 
@@ -179,7 +178,7 @@ def robot_surroundings(
     half_cone = 0.0 if sonar is None else sonar.half_angle
     grid = grid_of(body.room, start)
     seen = SupervisorConfig(mounts, half_cone=half_cone, range_min=near, range_max=far)
-    outline = outline_of(body.chassis)
+    outline = outline_of(body.chassis.footprint)
     careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
     avoidance = ObstacleAvoidance(careful)
     return RobotSurroundings(

@@ -158,7 +158,7 @@ def test_a_way_through_a_door_leads_through_it() -> None:
     for group in (ROUND, LATE):
         made = setting(group, 3, 1)
         closed = [door.at(0.0) for door in made.room.doors if door.share(0.0) == 0.0]
-        route = route_map(made.room, IPR).route(made.start[:2], (made.goal.x, made.goal.y))
+        route = route_map(made.room, IPR.footprint).route(made.start[:2], (made.goal.x, made.goal.y))
         assert isinstance(route, Route)
         places = route.places(0.05)
         assert min(np.hypot(*(places - (door.x, door.y)).T).min() for door in closed) < 0.4

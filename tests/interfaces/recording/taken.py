@@ -15,16 +15,18 @@ from interfaces.recording.run_recorders import RunRecorder
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.twin_run import TwinRun, fixed_offset
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
+from interfaces.runtime.session import run_twins
 from interfaces.system import software
 from interfaces.teleop import OperatorSite
-from robots import puma560
+from robots import load
+from robots.robot import exact_arm
 from tests.vrs.sessions import Draws, Generator
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.errors import VrsError
 from vrs.model import frozen_array
 
-MODEL = puma560.model()
+ROBOT = load("puma560")
+MODEL = ROBOT.arm
 NOMINAL = MODEL.poses["nominal"]
 PLAN = parse_plan(
     b"""{"schema": "vrs-plan/1", "title": "back and forth"}
@@ -47,7 +49,7 @@ def taken(
     profile = delay_profile(delay)
     recorder = RunRecorder(path)
     run = run_twins(
-        plan, MODEL, profile, arm,
+        plan, ROBOT, profile, arm,
         seed=seed, offset=fixed_offset(offset, profile), service=service, keeper=recorder, progress=progress,
     )  # fmt: skip
     recorder.finish()

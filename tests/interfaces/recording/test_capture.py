@@ -21,11 +21,12 @@ from interfaces.recording.track import REAL, VIRTUAL
 from interfaces.runs.summary import summarize, to_json
 from interfaces.runs.twin_run import Turn
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
+from interfaces.runtime.session import run_twins
 from interfaces.teleop import OperatorSite
 from interfaces.teleop.halt import Halt, HaltCause
+from robots.robot import exact_arm
 from tests.interfaces.recording import recorded, shown
-from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
+from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, ROBOT, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
 from vrs.commands import ParameterChange, PositionQuery, Retime, ScaleTime
 from vrs.errors import UnknownCommandError
@@ -164,7 +165,7 @@ def test_both_robots_are_shown_where_their_joints_put_them(tmp_path):
 @pytest.mark.parametrize("full", ["/dev/full", "{tmp}/no/such/folder/run.mcap"])
 def test_a_disk_that_takes_nothing_ends_the_recording_and_not_the_run(tmp_path, full):
     recorder = RunRecorder(Path(full.format(tmp=tmp_path)))
-    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    run = run_twins(PLAN, ROBOT, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
     recorder.finish()
     assert recorder.problem.startswith("recording failed: ")
     assert to_json(summarize(run)) == to_json(summarize(taken(tmp_path / "run.mcap")))
@@ -194,7 +195,7 @@ def small(monkeypatch):
 @pytest.mark.usefixtures("small")
 def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
     recorder = RunRecorder(tmp_path / "run.mcap")
-    run = run_twins(PLAN, MODEL, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
+    run = run_twins(PLAN, ROBOT, delay_profile("thu"), exact_arm, seed=0, keeper=recorder)
     recorder.finish()
     assert "takes no more after 30000 bytes" in recorder.problem
     with open_recording(tmp_path / "run.mcap") as recording:

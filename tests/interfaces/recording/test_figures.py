@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -17,11 +17,12 @@ from interfaces.recording.run_recorders import RunRecorder, extras_of
 from interfaces.runs.summary import Attribution, OffsetOutcome, summarize, to_json
 from interfaces.runs.twin_run import commands_alone
 from interfaces.runtime.plan import parse_plan
-from interfaces.runtime.session import exact_arm, run_twins
+from interfaces.runtime.session import run_twins
 from interfaces.teleop import OperatorSite
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, Sitting, taken
+from robots.robot import ExactArm, exact_arm
+from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, ROBOT, Sitting, taken
 from vrs import JointTarget, MotionCommand, Status
 from vrs.commands import Retime
 from vrs.errors import FormatError
@@ -35,11 +36,11 @@ STALLS = parse_plan(
 """An operator who moves on while messages stall."""
 
 
-class Stuck:
+class Stuck(ExactArm):
     """A body that doesn't move."""
 
-    def follow(self, reference):
-        return np.tile(PLAN.start, (len(reference.q), 1))
+    def follow(self, prepared):
+        return replace(super().follow(prepared), q=np.tile(PLAN.start, (len(prepared.q), 1)))
 
     def attach(self, mass):
         pass
@@ -98,7 +99,7 @@ READY
 """
     recorder = RunRecorder(tmp_path / "run.mcap")
     source = parse_file(text, "test.v2")
-    played = play(source, MODEL, delay_profile("mon"), exact_arm, seed=3, keeper=recorder)
+    played = play(source, ROBOT, delay_profile("mon"), exact_arm, seed=3, keeper=recorder)
     recorder.finish()
     with open_recording(tmp_path / "run.mcap") as recording:
         assert to_json(summary(recording)) == to_json(summarize(played.run))
@@ -107,7 +108,7 @@ READY
 
 def test_what_other_runs_said_comes_back(tmp_path):
     recorder = RunRecorder(tmp_path / "run.mcap")
-    run = run_twins(PLAN, MODEL, delay_profile("none"), exact_arm, seed=0, keeper=recorder)
+    run = run_twins(PLAN, ROBOT, delay_profile("none"), exact_arm, seed=0, keeper=recorder)
     causes = (("network", 0.1), ("payload_and_friction", 1 / 3), ("servo", 0.0))
     attributions = (Attribution("tool_rms_user_m", 0.7, causes, 0.1),)
     offsets = (OffsetOutcome("fixed:0.3", 0.1, 0.2, 3, 4, 1e-9),)

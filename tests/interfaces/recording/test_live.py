@@ -30,7 +30,7 @@ from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
 from interfaces.teleop import OperatorSite, RobotLine
-from tests.interfaces.live_rig import MODEL, NOMINAL, READY, child, robot_here, until
+from tests.interfaces.live_rig import MODEL, NOMINAL, READY, ROBOT, child, robot_here, until
 from tests.interfaces.recording import shown
 from vrs import Insertion, JointTarget, MotionCommand, Status, SteerCommand
 
@@ -41,7 +41,7 @@ async def recorded(url, path, told):
     listening = sockets.bind("127.0.0.1", 0)
     link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.03")))
     recording = LiveRecording(path, "adaptive", "hold", told.append)
-    config = LiveOperatorConfig(MODEL, NOMINAL, url, link, recording=recording)
+    config = LiveOperatorConfig(ROBOT, NOMINAL, url, link, recording=recording)
     operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], listening.getsockname()[1]))
     async with sockets.serve(app, listening), operator.running():

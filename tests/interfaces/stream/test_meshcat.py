@@ -17,9 +17,10 @@ from interfaces.stream.meshcat.committed import PIECE, CommittedPath
 from interfaces.stream.meshcat.meshes import bodies, shaded, tube
 from interfaces.stream.meshcat.newest import MOST_READERS, Newest, set_transform
 from interfaces.stream.meshcat.objects import module
-from robots import puma560
+from robots import load, puma560
 from robots.puma560.parameters import FLANGE
 from robots.puma560.shapes import LinkShape
+from robots.robot import Robot
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Timeline
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -42,7 +43,8 @@ class Shapeless:
 
 @pytest.fixture(scope="module")
 def made() -> TwinScene:
-    return TwinScene(MODEL, looks=bodies(MODEL))
+    robot = load("puma560")
+    return TwinScene(robot, looks=bodies(robot))
 
 
 @pytest.fixture
@@ -414,7 +416,8 @@ def test_a_tube_lies_round_its_line_with_its_outside_out(turn_back: bool) -> Non
 
 
 def test_a_robot_without_shapes_shows_frames_and_traces() -> None:
-    scene = TwinScene(Shapeless(), looks=bodies(Shapeless()))
+    robot = Robot("shapeless", Shapeless())
+    scene = TwinScene(robot, looks=bodies(robot))
     slot = scene.join()
     state = seen(taken(slot))
     for i in range(7):

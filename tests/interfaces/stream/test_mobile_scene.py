@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from interfaces.clients.appearance import parts_at
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.objects import SCREEN_INK
-from robots import ipr
+from robots import load
 from robots.ipr.robot import place
 from robots.ipr.shapes import SCREEN_SIZE, screen_pose
 from vrs import DriveCommand, Engine
 from vrs.errors import InvalidValueError
 from vrs.mobile import Grid
 
-MODEL = ipr.model()
-LOOKS = bodies(MODEL)
+ROBOT = load("ipr")
+MODEL = ROBOT.base
+LOOKS = bodies(ROBOT)
 
 
 def told(slot: Any) -> dict[str, dict[str, Any]]:
@@ -42,7 +42,7 @@ def objects(slot: Any) -> set[str]:
 
 
 def opened(**named: Any) -> tuple[TwinScene, Any]:
-    scene = TwinScene(MODEL, (0.0, 0.0, 0.0), looks=LOOKS, **named)
+    scene = TwinScene(ROBOT, (0.0, 0.0, 0.0), looks=LOOKS, **named)
     slot = scene.join()
     told(slot)
     return scene, slot
@@ -54,7 +54,7 @@ def test_robots_stand_where_their_postures_say() -> None:
     found = told(slot)
     assert found["/vrs/real visible"]["value"] is True
     for twin, posture in (("virtual", (1.0, 2.0, 0.5)), ("real", (0.5, 1.5, -2.0))):
-        for i, X in enumerate(parts_at(MODEL, posture)):
+        for i, X in enumerate(ROBOT.placed(posture)):
             sent = np.array(found[f"/vrs/{twin}/body/{i} set_transform"]["matrix"]).reshape(4, 4).T
             np.testing.assert_allclose(sent, X, atol=1e-6)
 

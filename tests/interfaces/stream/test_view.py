@@ -17,7 +17,8 @@ from websockets.sync.client import connect
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
-from robots import puma560
+from robots import load, puma560
+from robots.robot import Robot
 from tests.interfaces.pages import until, wait
 from tests.interfaces.stream.serving import Serving, served
 from tests.interfaces.stream.test_meshcat import Shapeless
@@ -38,7 +39,8 @@ def plan() -> Timeline:
 
 @pytest.fixture(scope="module")
 def made() -> TwinScene:
-    return TwinScene(MODEL, looks=bodies(MODEL))
+    robot = load("puma560")
+    return TwinScene(robot, looks=bodies(robot))
 
 
 @pytest.fixture
@@ -198,7 +200,8 @@ def test_the_page_connects_again_by_itself(made: TwinScene, open_page: Any) -> N
     wait(page, "document.getElementById('status').dataset.state === 'lost'")
     assert "trying again" in page.locator("#status-text").text_content()
     # A server that was started anew knows nothing of what the page shows.
-    other = TwinScene(Shapeless(), looks=bodies(Shapeless()))
+    shapeless = Robot("shapeless", Shapeless())
+    other = TwinScene(shapeless, looks=bodies(shapeless))
     with served(routes(other), port) as second:
         show(second, other, NOMINAL + 0.2, None)
         wait(page, "document.getElementById('status').dataset.state === 'live'")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
-from interfaces.runtime.session import exact_arm
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm
 from interfaces.val2.motion.remote import RemoteRobot
@@ -14,6 +13,8 @@ from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from interfaces.val2.values import Transformation, about_x, about_z, from_oat, to_oat
+from robots import load
+from robots.robot import exact_arm
 from tests.interfaces.joined import MODEL, bad, constant
 
 from .bench import SQUARE, Bench, close
@@ -206,7 +207,7 @@ LOOP = """.PROGRAM main()
 
 def played(text, delay="none"):
     typed = []
-    run = play(parse_file(text, "a.v2"), MODEL, delay_profile(delay), exact_arm, seed=1,
+    run = play(parse_file(text, "a.v2"), load("puma560"), delay_profile(delay), exact_arm, seed=1,
                listeners=Listeners(typed.append))  # fmt: skip
     assert run.error is None
     return run.run, [float(word) for word in "".join(typed).split()]

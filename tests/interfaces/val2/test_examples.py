@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from interfaces.link import delay_profile
-from interfaces.runtime.session import simulated_puma
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from robots import puma560
+from robots import load
 from vrs import Status
 
-model = puma560.model()
+robot = load("puma560")
+model = robot.arm
 PROGRAMS = sorted((Path(__file__).parents[3] / "examples" / "val2").glob("*.v2"))
 LAST = {
     "01_pick_and_place": "4 parts are on the tray\n",
@@ -44,7 +44,7 @@ def test_every_example_is_known():
 def test_on_the_twins(path):
     typed, told = [], []
     played = play(
-        source(path), model, delay_profile("thu"), simulated_puma(),
+        source(path), robot, delay_profile("thu"),
         seed=6, listeners=Listeners(typed.append, told.append),
     )  # fmt: skip
     run = played.run

@@ -9,15 +9,16 @@ import pytest
 
 from interfaces.cli import main
 from interfaces.link import delay_profile
-from interfaces.runtime.session import exact_arm
 from interfaces.val2.errors import ValError
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from interfaces.val2.values import from_base
-from robots import puma560
+from robots import load
+from robots.robot import exact_arm
 
-model = puma560.model()
+robot = load("puma560")
+model = robot.arm
 
 
 def program(*lines, name="main", after=""):
@@ -28,7 +29,7 @@ def twins(text, *, delay="none", asked=(), **options):
     typed, told, answers = [], [], iter(asked)
     listeners = Listeners(typed.append, told.append, lambda _: next(answers, None))
     source = parse_file(text, "test.v2")
-    played = play(source, model, delay_profile(delay), exact_arm, seed=1, listeners=listeners, **options)
+    played = play(source, robot, delay_profile(delay), exact_arm, seed=1, listeners=listeners, **options)
     return played, "".join(typed), told
 
 

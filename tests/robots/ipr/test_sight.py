@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robots.base import upright
 from robots.bullet.rooms import EMPTY, read_room
 from robots.bullet.world import SKY, Picture
 from robots.ipr.camera import Lens, Look, Sight, lens_pose
-from robots.ipr.shapes import upright
 
 LENS = Lens(width=240, height=180, view=math.radians(60.0))
 ROOM = read_room("""room 1

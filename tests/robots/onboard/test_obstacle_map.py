@@ -30,7 +30,7 @@ def watched(
     room: Room, seconds: float, w: float = 0.0, config: ObstacleMapConfig | None = None
 ) -> tuple[ObstacleMap, list[tuple[float, float]]]:
     """What a robot that turns on the spot has seen, and who moved in each scan."""
-    roads = route_map(room, IPR)
+    roads = route_map(room, IPR.footprint)
     found = ObstacleMap(Grid((120, 80), 0.05), lambda places: roads.knows(places, 0.07), config)
     body = BareBody("ipr", room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
     track, movers, seen = OdometryTrack(), [], -1.0

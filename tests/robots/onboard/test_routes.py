@@ -18,7 +18,7 @@ from robots.onboard.path import Arc, Pivot
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
 from vrs.errors import InvalidValueError
 
-CONFIG = route_config(IPR)
+CONFIG = route_config(IPR.footprint)
 
 
 def room(*boxes: tuple[float, float, float, float, float]) -> Room:
@@ -54,7 +54,7 @@ def test_a_route_keeps_its_distance_and_turns_where_there_is_room(
     things: list[tuple[float, float, float, float, float]], start: tuple[float, float], goal: tuple[float, float]
 ) -> None:
     made = room(*things)
-    roads = route_map(made, IPR)
+    roads = route_map(made, IPR.footprint)
     found = roads.route(start, goal)
     if isinstance(found, NoRoute):
         assert found.reason
@@ -72,7 +72,7 @@ def test_a_route_is_hardly_longer_than_the_shortest_way() -> None:
         rng = np.random.default_rng(seed)
         at, size = rng.uniform((1.5, 1.5), (6.5, 4.5), (4, 2)), rng.uniform(0.3, 1.6, (4, 2))
         made = room(*((*middle, *sides, 0.0) for middle, sides in zip(at.tolist(), size.tolist(), strict=True)))
-        roads, disc = route_map(made, IPR), Shortest(made, CONFIG.half_width + CONFIG.margin)
+        roads, disc = route_map(made, IPR.footprint), Shortest(made, CONFIG.half_width + CONFIG.margin)
         for start, goal in rng.uniform((0.6, 0.6), (7.4, 5.4), (12, 2, 2)).tolist():
             found = roads.route(start, goal)
             if isinstance(found, Route) and math.dist(start, goal) > 1.5:
@@ -84,9 +84,9 @@ def test_a_route_is_hardly_longer_than_the_shortest_way() -> None:
 
 def test_a_wall_with_a_closed_door_has_no_way_and_with_an_open_one_the_way_leads_through_it() -> None:
     closed = room((3.0, 3.0, 0.1, 6.0, 0.0))
-    assert isinstance(route_map(closed, IPR).route((1.0, 1.0), (6.0, 1.0)), NoRoute)
+    assert isinstance(route_map(closed, IPR.footprint).route((1.0, 1.0), (6.0, 1.0)), NoRoute)
     opened = room((3.0, 1.0, 0.1, 2.0, 0.0), (3.0, 4.5, 0.1, 3.0, 0.0))
-    found = route_map(opened, IPR).route((1.0, 1.0), (6.0, 1.0))
+    found = route_map(opened, IPR.footprint).route((1.0, 1.0), (6.0, 1.0))
     assert isinstance(found, Route)
     crossing = [(a, b) for a, b in pairwise(found.points) if a[0] < 3.0 <= b[0]]
     ((a, b),) = crossing
@@ -95,7 +95,7 @@ def test_a_wall_with_a_closed_door_has_no_way_and_with_an_open_one_the_way_leads
 
 
 def test_what_is_newly_seen_is_gone_round_or_leaves_no_way() -> None:
-    roads = route_map(room((3.0, 1.0, 0.1, 2.0, 0.0), (3.0, 4.5, 0.1, 3.0, 0.0)), IPR)
+    roads = route_map(room((3.0, 1.0, 0.1, 2.0, 0.0), (3.0, 4.5, 0.1, 3.0, 0.0)), IPR.footprint)
     start, goal = (1.0, 1.0), (6.0, 1.0)
     straight = roads.route((4.0, 1.0), (7.0, 1.0))
     assert isinstance(straight, Route)
@@ -143,7 +143,7 @@ def test_a_door_is_driven_through_in_which_the_robot_could_not_turn() -> None:
     assert wide < 2 * CONFIG.turning
     low, high = 3.0 - wide / 2, 6.0 - 3.0 - wide / 2
     made = room((3.0, low / 2, 0.1, low, 0.0), (3.0, 6.0 - high / 2, 0.1, high, 0.0))
-    roads = route_map(made, IPR)
+    roads = route_map(made, IPR.footprint)
     assert not roads.is_free((3.0, 3.0))
     found = roads.route((1.0, 1.0), (6.0, 5.0))
     assert isinstance(found, Route)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.clients.appearance import parts_at
 from interfaces.recording import open_recording
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
@@ -133,7 +132,7 @@ def test_the_stage_shows_what_was_known_then() -> None:
 def test_a_page_shows_both_robots_and_their_room(new_page) -> None:
     drive, path = recorded(WANDER)
     with open_recording(path) as recording:
-        model = recording.model
+        robot = recording.robot
     with served(path) as server:
         page = new_page(server.url, 640, 480, "light", expected="WebSocket connection")
         page.goto(f"{server.url}/replay")
@@ -142,7 +141,7 @@ def test_a_page_shows_both_robots_and_their_room(new_page) -> None:
         page.evaluate("replay.wish('seek', { t: 9 })")
         near(server, 9.0)
         for twin, posture in (("virtual", drive.virtual[180]), ("real", drive.real[180])):
-            expected = np.array([X.T.ravel() for X in parts_at(model, posture)])
+            expected = np.array([X.T.ravel() for X in robot.placed(posture)])
             until(lambda: np.abs(np.array(page.evaluate(POSES, twin)) - expected).max() < 1e-6)  # noqa: B023
         wait(page, "replay.node(0, 'vrs', 'driven', 'virtual', '0').children.length === 1")
         wait(page, "replay.node(0, 'vrs', 'room', '0').children.length === 1")

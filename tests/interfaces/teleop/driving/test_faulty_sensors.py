@@ -15,6 +15,7 @@ from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.halt import Halt, HaltCause
+from robots import load
 from robots.ipr.chassis import Senses
 from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
@@ -165,7 +166,7 @@ def test_one_bad_reading_is_no_fault() -> None:
 @pytest.mark.parametrize(("name", "sensor"), [("shafts", "left wheel's encoder"), ("distances", "sonar ring")])
 def test_a_live_robot_halts(name: str, sensor: str) -> None:
     async def run() -> None:
-        robot = PacedBody(PacedConfig(place("empty")))
+        robot = PacedBody(PacedConfig(load("ipr"), place("empty")))
         try:
             now = robot.clock.now()
             robot.host.site = robot.new_site(now)

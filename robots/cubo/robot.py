@@ -1,0 +1,28 @@
+"""CUBO as a value."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from robots.base import Footprint, MobileBase
+from robots.cubo.body import MOVES, CuboBody
+from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, WHEEL_RADIUS
+from robots.cubo.shapes import links, shapes
+from robots.ipr.model import PERIOD
+from robots.robot import Appearance, Robot, ThinClient
+from vrs.mobile import Wheels
+
+ROBOT: Final = Robot(
+    "cubo",
+    MobileBase(
+        LIMITS,
+        Wheels(WHEEL_BASE, WHEEL_RADIUS),
+        Footprint(CUBO.length, CUBO.width, CUBO.height, MASS, -CUBO.centre_x),
+        PERIOD,
+        "cubo",
+    ),
+    Appearance(shapes, links),
+    {"bullet": CuboBody},
+    (ThinClient(MODEL_FILE, MOVES),),
+)
+"""The thin client: it plans nothing, RSP drives it."""

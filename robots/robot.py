@@ -1,0 +1,307 @@
+"""A robot as a value: all that the house asks of one; and how one is found by what somebody calls it."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.base import MobileBase, box_shape, upright
+from robots.solids import LinkShape
+from vrs.checks import one_of
+from vrs.errors import FormatError, InvalidValueError
+from vrs.model import Array, RobotModel
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+GROUP: Final = "vrs.robots"
+"""Entry points of other packages in this group are robots that are found by their names."""
+FOUND: Final[Mapping[str, str]] = {
+    "puma560": "robots.puma560.robot:ROBOT",
+    "ipr": "robots.ipr.robots:ROBOT",
+    "micro": "robots.ipr.robots:MICRO",
+    "cubo": "robots.cubo.robot:ROBOT",
+}
+"""Robots of this package: where each is."""
+USUAL: Final = "puma560"
+"""The robot unless another is asked for."""
+USUAL_BASE: Final = "ipr"
+"""The same of mobile robots."""
+USUAL_CLIENT: Final = "cubo"
+"""The same of robots that are thin clients."""
+EXACT: Final = "exact"
+"""Body of any arm: it's where its reference is."""
+_FILES: Final = frozenset((".urdf", ".xacro", ".xml", ".mjcf"))
+
+
+class Prepared(NamedTuple):
+    """References with the feed-forward that belongs to them, (k, n) each."""
+
+    q: Array
+    """[rad], of prismatic joints [m]."""
+    qd: Array
+    """[rad/s], [m/s]."""
+    feedforward: Array
+    """[N m], [N]."""
+
+    def row(self, i: int) -> Prepared:
+        """One of them, (1, n) each."""
+        return Prepared(self.q[i : i + 1], self.qd[i : i + 1], self.feedforward[i : i + 1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """What a block of steps did; row i is the state at the end of step i."""
+
+    q: Array
+    """Encoder readings [rad], of prismatic joints [m], (k, n)."""
+    qd: Array
+    """Joint speeds [rad/s], [m/s], (k, n)."""
+    tau: Array
+    """Drive torques [N m], forces [N], (k, n), limited; row i acted during step i; (k, 0) without drives."""
+    saturated: NDArray[np.int64]
+    """Steps in which a drive was at its limit, by joint, (n,)."""
+
+
+class ArmBody(Protocol):
+    """What is real of an arm: it follows references, a row a step."""
+
+    def prepare(self, q_ref: ArrayLike, qd_ref: ArrayLike, qdd_ref: ArrayLike) -> Prepared:
+        """Work out beforehand what `follow` needs, of references for the ends of the next steps, (k, n) each."""
+
+    def follow(self, prepared: Prepared) -> Measured:
+        """Follow references that were prepared, a step each."""
+
+    def attach(self, mass: float) -> None:
+        """Take a load [kg] that the servo doesn't know."""
+
+    def release(self) -> None:
+        """Drop the load."""
+
+
+class ArmMaker(Protocol):
+    """Makes an arm's body, at rest."""
+
+    def __call__(self, q: ArrayLike, *, friction: bool = True, dt: float = 1e-3) -> AbstractContextManager[ArmBody]:
+        """Make a body.
+
+        Args:
+            q: Joint positions [rad], of prismatic joints [m], (n,).
+            friction: Whether its joints have friction.
+            dt: Its step [s].
+        """
+
+
+class ExactArm:
+    """A body with no dynamics: it is where its reference is, whatever it holds."""
+
+    def prepare(self, q_ref: ArrayLike, qd_ref: ArrayLike, _qdd_ref: ArrayLike) -> Prepared:
+        """Take references as they are."""
+        q, qd = np.asarray(q_ref), np.asarray(qd_ref)
+        return Prepared(q, qd, np.empty((len(q), 0)))
+
+    def follow(self, prepared: Prepared) -> Measured:
+        """Go where they are."""
+        return Measured(*prepared, np.zeros(prepared.q.shape[1], dtype=np.int64))
+
+    def attach(self, mass: float) -> None:
+        """Take a load, which changes nothing."""
+
+    def release(self) -> None:
+        """Drop the load, which changes nothing."""
+
+
+@contextmanager
+def exact_arm(q: ArrayLike, *, friction: bool = True, dt: float = 1e-3) -> Iterator[ArmBody]:  # noqa: ARG001
+    """Make a body that follows exactly."""
+    yield ExactArm()
+
+
+@dataclass(frozen=True, slots=True)
+class Appearance:
+    """What a robot looks like."""
+
+    shapes: Callable[[], Sequence[LinkShape]]
+    """Makes its shapes: of an arm one for the base and one a link, in their frames."""
+    poses: Callable[[ArrayLike], Array]
+    """Says where the shapes are, (m, 4, 4), at joints (n,), or at a posture (x, y, θ), (3,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper:
+    """A hand that takes and drops loads."""
+
+    point: tuple[float, float, float]
+    """Where it holds, in the last link's frame [m]: the point of the tool that is drawn and dragged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """A screen that shows messages."""
+
+    size: tuple[float, float]
+    """Width and height [m]."""
+    pose: Callable[[], Array]
+    """Its pose in the robot's frame, (4, 4): x out of it, y to its left."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeadCamera:
+    """A camera that pictures are made with."""
+
+
+@dataclass(frozen=True, slots=True)
+class ThinClient:
+    """The robot plans nothing: RSP addresses its effectors and sensors by bindings."""
+
+    model: Path
+    """Its robot model, XMI."""
+    moves: tuple[str, ...]
+    """Bindings of its effectors."""
+
+
+_D = TypeVar("_D")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """All that the house asks of a robot."""
+
+    name: str
+    """Short name, as people and recordings know it."""
+    model: RobotModel | MobileBase
+    """What an engine needs: limits, named poses, kinematics; or, of a base, its limits and wheels."""
+    appearance: Appearance | None = None
+    """None draws a base as a box, an arm as its frames and traces."""
+    bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
+    `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
+    devices: tuple[object, ...] = ()
+    """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
+    found_by: str = ""
+    """What `load` finds it by, so that other processes can; empty for one that was made up on the spot."""
+
+    @property
+    def is_base(self) -> bool:
+        """Whether it's a mobile robot, and no arm."""
+        return isinstance(self.model, MobileBase)
+
+    @property
+    def arm(self) -> RobotModel:
+        """The model of an arm.
+
+        Raises:
+            InvalidValueError: If the robot is none.
+        """
+        if isinstance(self.model, MobileBase):
+            raise InvalidValueError("robot", self.name, "an arm; this one is a mobile robot")
+        return self.model
+
+    @property
+    def base(self) -> MobileBase:
+        """The model of a mobile robot.
+
+        Raises:
+            InvalidValueError: If the robot is none.
+        """
+        if not isinstance(self.model, MobileBase):
+            raise InvalidValueError("robot", self.name, "a mobile robot; this one is an arm")
+        return self.model
+
+    @property
+    def tool(self) -> tuple[float, float, float]:
+        """The point of an arm's tool, in the last link's frame [m]."""
+        gripper = self.device(Gripper)
+        return (0.0, 0.0, 0.0) if gripper is None else gripper.point
+
+    def shapes(self) -> tuple[LinkShape, ...]:
+        """Its shapes; without an appearance a mobile robot is a box, and an arm has none."""
+        if self.appearance is None:
+            return (box_shape(self.base.body),) if self.is_base else ()
+        return tuple(self.appearance.shapes())
+
+    def placed(self, where: ArrayLike) -> Array:
+        """Poses of its shapes, (m, 4, 4), at joints (n,) or at a posture (x, y, θ), (3,)."""
+        if self.appearance is None:
+            return upright(*np.asarray(where).tolist())[None] if self.is_base else np.empty((0, 4, 4))
+        return self.appearance.poses(where)
+
+    def device(self, kind: type[_D]) -> _D | None:
+        """What it carries of a kind; None where it carries none."""
+        return next((device for device in self.devices if isinstance(device, kind)), None)
+
+    @property
+    def usual_body(self) -> str:
+        """Name of the body that an arm has unless another is asked for."""
+        return next(iter(self.bodies), EXACT)
+
+    def body(self, name: str = "") -> Callable[..., Any]:
+        """What makes a body: of an arm an `ArmMaker`.
+
+        Args:
+            name: One of `bodies`, of an arm also `exact`; the usual one unless given.
+
+        Raises:
+            InvalidValueError: If it has no such body.
+        """
+        exact: dict[str, Callable[..., Any]] = {} if self.is_base else {EXACT: exact_arm}
+        bodies = {**self.bodies, **exact}
+        return bodies[one_of(f"body of {self.name}", name or self.usual_body, bodies)]
+
+
+def names() -> tuple[str, ...]:
+    """Names by which robots are found: those of this package, then those of entry points."""
+    return *FOUND, *sorted({point.name for point in added()} - FOUND.keys())
+
+
+def load(what: str) -> Robot:
+    """Find a robot.
+
+    Args:
+        what: Its name (see `names`), or `MODULE:NAME` of a `Robot` of one's own; the module may lie in the working
+            directory.
+
+    Raises:
+        InvalidValueError: If there's no such robot, or what is there isn't one.
+        FormatError: If its module can't be imported.
+    """
+    where, colon, name = what.partition(":")
+    own = bool(colon and where and name.isidentifier())
+    point = next((point for point in added() if point.name == what), None)
+    reference = what if own else FOUND.get(what) or (None if point is None else point.value)
+    if reference is None:
+        allowed = f"one of {', '.join(names())}, or MODULE:NAME of your own"
+        if Path(what).suffix.lower() in _FILES or os.sep in what:
+            allowed += "; robots aren't read from files yet"
+        raise InvalidValueError("robot", what, allowed)
+    where, _, name = reference.partition(":")
+    if own and os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    # A stranger's module may raise anything.
+    try:
+        module = importlib.import_module(where)
+    except Exception as error:
+        raise FormatError(what, f"can't be imported as a robot: {type(error).__name__}: {error}") from error
+    robot = getattr(module, name, None)
+    if not isinstance(robot, Robot):
+        there = ", ".join(sorted(key for key, value in vars(module).items() if isinstance(value, Robot))) or "none"
+        raise InvalidValueError(f"robot in {where}", name, f"a Robot there ({there})")
+    return replace(robot, found_by=what)
+
+
+@lru_cache(maxsize=1)
+def added() -> tuple[EntryPoint, ...]:
+    """Robots of other packages."""
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group=GROUP))

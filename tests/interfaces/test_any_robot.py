@@ -1,0 +1,269 @@
+"""Robots that nobody here knows: made up in a few lines, they go through every room that takes a robot."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import json
+import re
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from interfaces import connect_mobile
+from interfaces.cli.main import app, exit_status
+from interfaces.lab.driving.run import run
+from interfaces.runs.drive_run import DriveCase
+from tests.interfaces import own_arm, own_base
+from tests.interfaces.live_rig import child
+from tests.interfaces.station.opened import Page, station
+
+HERE = Path(__file__).parent
+ARM, BASE = "tests.interfaces.own_arm:ROBOT", "tests.interfaces.own_base:ROBOT"
+PLAN = """{"title": "Lifting"}
+{"issue": 0.0, "execute": 0.5, "move": [40, 0.4, -60], "speed": 0.8}
+{"issue": 1.0, "payload": {"mass_kg": 2.0}}
+{"issue": 2.0, "execute": 2.5, "move": {"pose": "low"}}
+"""
+
+
+NAMES = re.compile(r"puma|\bipr\b|\bmicro\b|cubo", re.IGNORECASE)
+OF_ALL_BASES = re.compile(
+    r"\s*from robots\.ipr\.(camera|chassis|floor_plan|model|navigation|position|robot|shapes) import"
+)
+"""Modules of `robots.ipr` that are of any mobile robot, and bear its name only by where they lie."""
+STORED = '    body: Literal["ipr", "micro", "bare"]'
+"""What recordings of drives may be of: the schema stands in each file."""
+
+
+def test_no_shared_room_names_a_robot() -> None:
+    shared = [
+        path
+        for path in sorted((HERE.parents[1] / "interfaces").rglob("*"))
+        if path.suffix in {".py", ".js", ".html", ".css"}
+        and path.parts[len(HERE.parents[1].parts) + 1] not in {"val2", "lab"}
+    ]
+    assert len(shared) > 200
+    found = [
+        f"{path.relative_to(HERE.parents[1])}:{number}: {line.strip()}"
+        for path in shared
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if NAMES.search(line) and not OF_ALL_BASES.match(line) and line != STORED
+    ]
+    assert found == []
+
+
+def vrs(*arguments: object) -> str:
+    """What a command says on standard output; it ends well."""
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def code_lines(path: Path) -> int:
+    """Lines of a module that aren't blank, documentation or imports."""
+    text = path.read_text(encoding="utf-8")
+    left: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and body and isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            first = body[0]
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                left |= set(range(first.lineno, (first.end_lineno or 0) + 1))
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            left |= set(range(node.lineno, (node.end_lineno or 0) + 1))
+    return sum(bool(line.strip()) and number not in left for number, line in enumerate(text.splitlines(), start=1))
+
+
+@pytest.mark.parametrize("module", [own_arm, own_base])
+def test_a_robot_is_made_up_in_60_lines(module: ModuleType) -> None:
+    assert code_lines(Path(str(module.__file__))) <= 60
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a demo of the arm leaves."""
+    out = tmp_path_factory.mktemp("arm")
+    (out / "plan.jsonl").write_text(PLAN)
+    vrs("demo", "--robot", ARM, "--commands", out / "plan.jsonl", "--delay", "wed", "--out", out / "out")
+    return out / "out"
+
+
+def test_a_demo_tells_joints_that_turn_in_degrees_and_those_that_slide_in_metres(demo: Path) -> None:
+    summary = json.loads((demo / "summary.json").read_text())
+    assert summary["robot"] == "crane"
+    servo = summary["errors"]["servo"]
+    assert [x is None for x in servo["joint_rms_deg"]] == [False, True, False]
+    assert [x is None for x in servo["joint_rms_m"]] == [True, False, True]
+    # Its load of 2 kg is taken in mid-run, and it sags by a millimetre a kilogram.
+    assert servo["joint_max_m"][1] == pytest.approx(2e-3, abs=1e-3)
+    assert servo["worst_joint"] == 2
+    assert summary["receipts_virtual"][0]["q_m"] == [None, 0.4, None]
+    assert summary["receipts_virtual"][0]["q_deg"] == pytest.approx([40.0, None, -60.0])
+    assert summary["commands"]["real"]["accepted"] == 2
+
+
+def test_its_recording_says_what_the_run_said(demo: Path, tmp_path: Path) -> None:
+    path = demo / "run.mcap"
+    assert vrs("compare", path, "--robot", ARM, "--json") == (demo / "summary.json").read_text()
+    assert "2 commands and corrections, 2 timelines compared" in vrs("replay", path, "--commands", "--robot", ARM)
+    shown = json.loads(vrs("replay", path, "--headless", "--at", 2.0, "--json", "--robot", ARM).splitlines()[-1])
+    assert shown["q_virtual"] == pytest.approx([np.radians(40), 0.4, np.radians(-60)])
+    vrs("export", path, "--csv", tmp_path, "--report", tmp_path / "report.html", "--robot", ARM)
+    assert (tmp_path / "report.html").read_bytes() == (demo / "report.html").read_bytes()
+    with open(tmp_path / "real.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {"q1_rad", "q2_m", "q3_rad", "reference2_m"} <= rows[0].keys()
+    last = [float(rows[-1][name]) for name in ("q1_rad", "q2_m", "q3_rad")]
+    assert last == pytest.approx([0.5, 0.05 - 2e-3, -1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("arguments", [("compare",), ("replay", "--commands"), ("export", "--report", "r.html")])
+def test_without_the_robot_its_recording_says_what_is_missing(
+    demo: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, *more = arguments
+    assert exit_status([name, str(demo / "run.mcap"), *more]) == 2
+    assert "of a robot that isn't known here: 'crane'; --robot says where it is" in capsys.readouterr().err
+
+
+def test_a_demo_needs_no_plan(tmp_path: Path) -> None:
+    vrs("demo", "--robot", ARM, "--delay", "none", "--out", tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["title"] == "Round trip"
+    assert summary["commands"]["virtual"]["rejected"] == 0
+    assert summary["path"]["progress"] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("move", "said"),
+    [("[40, 0.6, 0]", "joint 2 must be within [0, 0.5] m"),
+     ("[200, 0.1, 0]", "joint 1 must be within [-2.5, 2.5] rad"),
+     ("[1, 2]", "3 finite joint values [deg, of prismatic joints m]")],
+)  # fmt: skip
+def test_errors_are_in_the_joints_units(
+    tmp_path: Path, move: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "plan.jsonl").write_text(f'{{"issue": 0.0, "move": {move}}}')
+    asked = ["demo", "--robot", ARM, "--commands", str(tmp_path / "plan.jsonl"), "--out", str(tmp_path)]
+    assert exit_status(asked) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> None:
+    page = new_page((demo / "report.html").as_uri(), 1280, 900, "light", offline=True)
+    page.goto((demo / "report.html").as_uri())
+    page.wait_for_function("window.report !== undefined")
+    titles = page.locator("figure h3").all_text_contents()
+    assert {"Joint errors", "Errors of prismatic joints", "Joint 3"} <= set(titles)
+    assert page.locator("#no-3d").is_hidden()
+    q = np.array([0.7, 0.4, -1.0])
+    np.testing.assert_allclose(
+        page.evaluate("(q) => report.links(q)", q.tolist()),
+        [X.T.ravel() for X in own_arm.ROBOT.arm.links(q)],
+        atol=1e-9,
+    )
+    shapes = json.loads(page.locator("#run-data").text_content())["links"]
+    assert [shape["name"] for shape in shapes] == ["link 0", "link 1", "link 2", "link 3"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
+        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
+        (("console", "--robot", ARM), "an arm of 6 joints that turn"),
+        (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
+        (("lab", "--robot", ARM, "--out", "."), "a mobile robot; this one is an arm"),
+        (("demo", "--robot", "tests.interfaces.own_arm:Crane"), "a Robot there (ROBOT)"),
+        (("demo", "--robot", "crane.urdf"), "aren't read from files yet"),
+    ],
+)
+def test_doors_say_which_robots_they_take(
+    arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_status(list(arguments)) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_it_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_page: Any) -> None:
+    path = tmp_path / "live.mcap"
+    with child("serve", "--port", "0", "--robot", ARM, "--link-loss", "hold", "--record", str(path)) as server:
+        url = station(server)
+        page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open()
+        assert not page.get("station.config.panels.some((panel) => panel.name === 'terminal')")
+        page.take_control()
+        page.get(
+            "station.session.order({ type: 'move', target: { type: 'joints', q: [0.5, 0.35, -0.5] }, "
+            "insertion: 'replace' }, 'lift')"
+        )
+        page.until(lambda: np.allclose(page.real, [0.5, 0.35, -0.5], atol=2e-3))
+        page.wait("document.querySelectorAll('.joint .value')[1].textContent === '0.350 m'")
+        page.wait("document.querySelectorAll('.joint .value')[0].textContent === '28.6°'")
+        assert page.errors == []
+        page.page.context.close()
+    summary = json.loads(vrs("compare", path, "--robot", ARM, "--json"))
+    assert summary["robot"] == "crane"
+    assert summary["receipts_virtual"][-1]["q_m"] == [None, 0.35, None]
+    assert "identical" in vrs("replay", path, "--commands", "--robot", ARM)
+
+
+def test_a_base_of_another_size_drives_in_the_laboratory(tmp_path: Path) -> None:
+    case = DriveCase(robot=BASE, operator="slalom", delay="constant:0.3", length=5.0)
+    drive = run(case)
+    assert 0.1 < np.abs(drive.drives[:, 0]).max() <= own_base.LIMITS.v_max
+    assert drive.limits_passed() == 0
+    assert drive.compare().path_error_max < 0.05
+    vrs(
+        "lab",
+        "--robot",
+        BASE,
+        "--operator",
+        "slalom",
+        "--runs",
+        1,
+        "--length",
+        2,
+        "--workers",
+        1,
+        "--out",
+        tmp_path,
+    )
+    with open(tmp_path / "runs.csv", newline="") as file:
+        assert {row["robot"] for row in csv.DictReader(file)} == {BASE}
+
+
+def test_a_base_without_shapes_is_a_box_where_it_stands() -> None:
+    (box,) = own_base.ROBOT.shapes()
+    front = own_base.CHASSIS.centre_x + own_base.CHASSIS.length / 2
+    assert box.vertices[:, 0].max() == pytest.approx(front)
+    assert box.vertices[:, 0].min() == pytest.approx(front - own_base.CHASSIS.length)
+    (X,) = own_base.ROBOT.placed((1.0, 2.0, np.pi / 2))
+    assert pytest.approx([1.0, 3.0, 0.0, 1.0]) == X @ [1, 0, 0, 1]
+
+
+def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: Any) -> None:
+    with child("serve", "--port", "0", "--robot", BASE, "--room", "furnished", "--link-loss", "hold") as server:
+        url = station(server)
+        page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open(live=False)
+        with connect_mobile(url.rstrip("/"), name="somebody", timeout=20.0) as robot:
+            assert robot.welcome.robot == "cart"
+            assert robot.welcome.limits.v_max == own_base.LIMITS.v_max
+            assert robot.wait(lambda it: it.postures is not None and it.postures.real is not None, 60.0)
+            robot.acquire()
+            assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
+            begun = robot.postures.real.x
+            for _ in range(20):
+                robot.drive(0.7, 0.0, wait=5.0)
+                time.sleep(0.1)
+            assert robot.wait(lambda it: it.postures.real.x > begun + 0.2, 30.0)
+            assert not page.get("station.config.panels.some((panel) => panel.name === 'camera')")
+        assert page.errors == []
+        page.page.context.close()

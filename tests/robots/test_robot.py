@@ -1,0 +1,110 @@
+"""Robots as values, and how they are found."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robots
+from robots.robot import EXACT, FOUND, Display, Gripper, HeadCamera, Robot, ThinClient
+from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile import MobileModel
+from vrs.model import RobotModel
+
+ARMS, BASES = ("puma560",), ("ipr", "micro", "cubo")
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_each_robot_is_found_by_its_name_and_stands_where_its_shapes_are_told(name: str) -> None:
+    robot = robots.load(name)
+    assert (robot.name, robot.found_by) == (name, name)
+    assert robot.appearance is not None
+    where = np.zeros(robot.arm.limits.dof if name in ARMS else 3)
+    assert robot.appearance.poses(where).shape == (len(robot.appearance.shapes()), 4, 4)
+    assert next(iter(robot.bodies)) == "bullet"
+    assert isinstance(robot.model, RobotModel if name in ARMS else MobileModel)
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_a_base_is_no_arm(name: str) -> None:
+    with pytest.raises(InvalidValueError, match="an arm; this one is a mobile robot"):
+        _ = robots.load(name).arm
+
+
+def test_robots_carry_their_devices() -> None:
+    arm, base, client = map(robots.load, ("puma560", "ipr", "cubo"))
+    assert arm.device(Gripper) is not None
+    assert arm.tool == (0.0, 0.0, 0.05625)
+    assert base.tool == (0.0, 0.0, 0.0)
+    assert base.device(Display) is not None
+    assert base.device(HeadCamera) is not None
+    assert arm.device(Display) is base.device(Gripper) is base.device(ThinClient) is None
+    thin = client.device(ThinClient)
+    assert thin is not None
+    assert thin.model.is_file()
+
+
+def test_an_arms_bodies_follow_and_hold_loads() -> None:
+    robot = robots.load("puma560")
+    q = robot.arm.poses["ready"]
+    still = np.tile(q, (20, 1)), np.zeros((20, 6)), np.zeros((20, 6))
+    for name in ("bullet", EXACT):
+        with robot.body(name)(q, friction=False) as body:
+            body.attach(2.5)
+            measured = body.follow(body.prepare(*still))
+            body.release()
+        assert measured.q.shape == (20, 6)
+        assert np.abs(measured.q - q).max() == pytest.approx(0.0 if name == EXACT else 1e-3, abs=1e-3)
+    assert robot.usual_body == "bullet"
+    assert robot.body() is robot.bodies["bullet"]
+    assert Robot("bare", robot.model).usual_body == EXACT
+    with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, exact; given: 'jelly'"):
+        robot.body("jelly")
+
+
+def test_ones_own_robot_lies_in_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"own_{tmp_path.name}"
+    text = "from robots import Robot, ipr\nMINE, ANSWER = Robot('mine', ipr.model()), 42\n"
+    (tmp_path / f"{name}.py").write_text(text)
+    (tmp_path / f"{name}_broken.py").write_text("1 / 0")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    robot = robots.load(f"{name}:MINE")
+    assert (robot.name, robot.found_by) == ("mine", f"{name}:MINE")
+    for other in ("ANSWER", "YOURS"):
+        with pytest.raises(InvalidValueError, match=r"a Robot there \(MINE\)"):
+            robots.load(f"{name}:{other}")
+    with pytest.raises(FormatError, match="ZeroDivisionError"):
+        robots.load(f"{name}_broken:MINE")
+    with pytest.raises(FormatError, match="ModuleNotFoundError"):
+        robots.load("nothing.of.the.kind:MINE")
+
+
+def test_entry_points_add_names_and_replace_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = [EntryPoint(name, "robots.cubo.robot:ROBOT", "vrs.robots") for name in ("theirs", "ipr")]
+    monkeypatch.setattr("robots.robot.added", lambda: tuple(points))
+    assert robots.names() == (*FOUND, "theirs")
+    assert robots.load("theirs").name == "cubo"
+    assert robots.load("ipr").name == "ipr"
+
+
+@pytest.mark.parametrize("what", ["r2d2", "", ":", "a:", ":b", "robots/arm.py", "arm.urdf", "arm.XACRO", "a:b c"])
+def test_an_error_says_what_is_allowed(what: str) -> None:
+    with pytest.raises(InvalidValueError, match=r"one of puma560, ipr, micro, cubo.*, or MODULE:NAME") as error:
+        robots.load(what)
+    assert ("aren't read from files yet" in str(error.value)) == ("/" in what or what.startswith("arm"))
+
+
+def test_nothing_heavy_is_loaded_before_a_body_or_a_shape_is_made() -> None:
+    script = (
+        "import sys, robots\nassert not any(name.startswith('robots.puma560') for name in sys.modules)\n"
+        "for name in robots.names(): robots.load(name).model\n"
+        "print(sorted({'pybullet', 'trimesh', 'roboticstoolbox', 'scipy.interpolate'} & sys.modules.keys()))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"
