@@ -12,6 +12,7 @@ from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, 
 from interfaces.messages.sites import LogEntry, Orders
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.robot import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig
@@ -140,7 +141,7 @@ def test_an_arm_that_is_held_stops_and_goes_on_only_when_told() -> None:
     robot.measured(NOMINAL + 0.1, now=lab.now)
     assert "from where it should be" in robot.halted
     lab.run(4.0)
-    assert operator.halted == robot.halted
+    assert operator.halted == Halt(HaltCause.REPORTED, robot.halted)
     assert operator.corrections[-1].error.any()
     assert np.abs(operator.engine.joints(4.0) - NOMINAL - 0.1).max() < 1e-9
     assert "resume" in operator.execute(MotionCommand(JointTarget(NOMINAL)), now=4.0).reason
