@@ -38,7 +38,7 @@ for name, agent, delay in (
     track = run(curve, agent, delay, seed=1)
     away = [math.dist(curve.at(curve.nearest(x, y))[:2], (x, y)) for x, y, _ in track.postures[::5].tolist()]
     end = f"arrived after {track.t[-1]:.1f} s" if track.arrived else f"not there after {track.t[-1]:.0f} s"
-    slowed = agent.counts.slowed
+    slowed = agent.scheduler.slowed
     print(
         f"{name:32} {end}, {100 * sum(away) / len(away):.1f} cm off the path on average, {slowed} commands slowed"
     )

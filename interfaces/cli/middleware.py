@@ -10,7 +10,7 @@ import typer
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
-    from interfaces.middleware import Errors, GainNetwork, TrainingConfig
+    from interfaces.middleware import GainNetwork, TrainingConfig
 
 EXAMPLES = 100_000
 """Factors and delays that a network is tested with, of each kind."""
@@ -51,12 +51,11 @@ def train(
     if as_json:
         import json
 
-        errors = {kind: one._asdict() for kind, one in found.items()}
-        summary = {"file": str(out), "seed": seed, "epsilon": epsilon, "epochs": network.epochs, "errors": errors}
+        summary = {"file": str(out), "seed": seed, "epsilon": epsilon, "epochs": network.epochs, "errors": found}
         typer.echo(json.dumps(summary, indent=2))
         return
     for kind, one in found.items():
-        typer.echo(f"A {kind}: relative error of K p99 {one.p99:.1e}, largest {one.largest:.1e}")
+        typer.echo(f"A {kind}: relative error of K p99 {one['p99']:.1e}, largest {one['largest']:.1e}")
     typer.echo(f"Wrote {out} after {network.epochs} epochs")
 
 
@@ -84,7 +83,7 @@ def _trained(config: TrainingConfig, seed: int) -> GainNetwork:
         )
 
 
-def _tested(network: GainNetwork) -> dict[str, Errors]:
+def _tested(network: GainNetwork) -> dict[str, dict[str, float]]:
     import numpy as np
 
     from interfaces.middleware.network import errors, examples

@@ -5,18 +5,15 @@ Source: Tipsuwan, Chow, *Model Predictive Path Tracking via Middleware for Netwo
 
 from interfaces.middleware.middleware import (
     ActionAgent,
-    ActionAgentConfig,
     Controller,
     DriveFeedback,
     DriveSetpoint,
     GainScheduler,
     GainSchedulingMiddleware,
     MiddlewareConfig,
-    ScheduleCounts,
     predicted,
 )
 from interfaces.middleware.network import (
-    Errors,
     Formulation,
     GainNetwork,
     Ranges,
@@ -30,18 +27,15 @@ from interfaces.middleware.performance import drive_measure, measure, optimal_ga
 
 __all__ = [
     "ActionAgent",
-    "ActionAgentConfig",
     "Controller",
     "DriveFeedback",
     "DriveSetpoint",
-    "Errors",
     "Formulation",
     "GainNetwork",
     "GainScheduler",
     "GainSchedulingMiddleware",
     "MiddlewareConfig",
     "Ranges",
-    "ScheduleCounts",
     "TrainingConfig",
     "default_network",
     "drive_measure",

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Annotated, TypeAlias
+from typing import TypeAlias
 
 from interfaces.link.round_trip import Echo, Probe, ProbeConfig, RoundTripEstimator, WindowConfig
 from interfaces.middleware.network import GainNetwork
 from interfaces.middleware.performance import drive_measure, optimal_gain, tolerance
 from robots.onboard.driving import STAND, Drive, Posture
-from vrs.checks import validated, within
+from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced
 
@@ -67,18 +67,6 @@ _STRAIGHTEST_PIVOT = 1e9
 """From this |A| on [1/m] a drive is a turn on the spot: its curve has a radius under a nanometre."""
 
 
-@dataclass(frozen=True, slots=True)
-class ScheduleCounts:
-    """What a scheduler has done so far."""
-
-    drives: int
-    """All that it was given."""
-    slowed: int
-    """Of which J would have been over ε."""
-    exact: int
-    """Of these, those whose gain is the exact root, as the network's broke J ≤ ε, or it isn't trained on them."""
-
-
 class GainScheduler:
     """Passes on drives with J ≤ ε to rounding, whatever it is given and whatever its network says.
 
@@ -101,12 +89,12 @@ class GainScheduler:
         if network is not None and network.epsilon != self.epsilon:
             raise InvalidValueError("network", network.epsilon, f"one that was trained for ε = {self.epsilon:g}")
         self._network = network
-        self._drives = self._slowed = self._exact = 0
-
-    @property
-    def counts(self) -> ScheduleCounts:
-        """What it has done so far."""
-        return ScheduleCounts(self._drives, self._slowed, self._exact)
+        self.drives = 0
+        """How many it was given so far."""
+        self.slowed = 0
+        """Of which J would have been over ε."""
+        self.exact = 0
+        """Of these, those given the exact root, as the network's broke J ≤ ε, or it isn't trained on them."""
 
     def schedule(self, drive: Drive, tau: float) -> Drive:
         """Return the drive itself, or a slower one on the same curve.
@@ -121,19 +109,19 @@ class GainScheduler:
         v, w = checked(drive)
         if not 0 <= tau < math.inf:
             raise InvalidValueError("tau", tau, "finite seconds, 0 or more")
-        self._drives += 1
+        self.drives += 1
         if drive_measure(drive, tau) <= self.epsilon:
             return drive
-        self._slowed += 1
+        self.slowed += 1
         if abs(w) >= 2 * _STRAIGHTEST_PIVOT * abs(v):
-            self._exact += 1
+            self.exact += 1
             return _scaled(drive, self.epsilon / (tau * math.hypot(v, w)))
         A, network = 0.5 * w / v, self._network
         if network is not None and network.covers(A, tau):
             slowed = _scaled(drive, network.gain(A, tau) / abs(v))
             if abs(slowed.v) > 0.0 and drive_measure(slowed, tau) <= self.epsilon:
                 return slowed
-        self._exact += 1
+        self.exact += 1
         return _scaled(drive, optimal_gain(A, tau, self.epsilon) / abs(v))
 
 
@@ -152,17 +140,6 @@ def _scaled(drive: Drive, share: float) -> Drive:
     return Drive(drive.v * share, drive.w * share)
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class ActionAgentConfig:
-    """How the robot's end works."""
-
-    period: Annotated[float, within(1e-4, 1.0, "s")] = 0.01
-    """T: between two sampling times [s], in [1e-4, 1]."""
-    starved: Annotated[float, within(1e-3, 60.0, "s")] = 0.5
-    """How long a command holds when no other comes [s], in [1e-3, 60]."""
-
-
 class ActionAgent:
     """The robot's end: drives the newest command, echoes probes, reports where it is; it reads no clock.
 
@@ -170,9 +147,13 @@ class ActionAgent:
     robot stops, and goes on with the next command; there's no age gate.
     """
 
-    def __init__(self, config: ActionAgentConfig | None = None) -> None:
-        """Stand until the first command."""
-        self.config = ActionAgentConfig() if config is None else config
+    def __init__(self, starved: float = 0.5) -> None:
+        """Stand until the first command.
+
+        Args:
+            starved: How long a command holds when no other comes [s], in [1e-3, 60].
+        """
+        self._starved = number_in("starved", starved, 1e-3, 60.0, unit=" s")
         self._newest: DriveSetpoint | None = None
         self._since = -math.inf
         self._reports = 0
@@ -210,7 +191,7 @@ class ActionAgent:
 
     def driving(self, *, now: float) -> Drive:
         """What the robot drives now [s], by its own clock."""
-        if self._newest is None or now - self._since > self.config.starved:
+        if self._newest is None or now - self._since > self._starved:
             return STAND
         return self._newest.drive
 
@@ -269,15 +250,11 @@ class GainSchedulingMiddleware:
         self.config = MiddlewareConfig() if config is None else config
         self.traffic = RoundTripEstimator(session, self.config.probing, start=start)
         """The traffic estimator."""
-        self._scheduler = GainScheduler(self.config.epsilon, network)
+        self.scheduler = GainScheduler(self.config.epsilon, network)
+        """What slows drives, and counts them."""
         self._probes = self.config.predicts or self.config.schedules
         self._heard = -1
         self._sent = 0
-
-    @property
-    def counts(self) -> ScheduleCounts:
-        """What was scheduled so far."""
-        return self._scheduler.counts
 
     def next_deadline(self) -> float | None:
         """When `to_send` has something to do [s]; None for never."""
@@ -335,4 +312,4 @@ class GainSchedulingMiddleware:
         wanted = Drive(*self._controller(posture))
         if not config.schedules or mean is None:
             return checked(wanted)
-        return self._scheduler.schedule(wanted, mean)
+        return self.scheduler.schedule(wanted, mean)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final
 
 import msgspec
 import numpy as np
@@ -224,14 +224,6 @@ class TrainingConfig:
         object.__setattr__(self, "formulation", Formulation(self.formulation))
 
 
-class Errors(NamedTuple):
-    """Relative errors of a network's gain against the exact one."""
-
-    median: float
-    p99: float
-    largest: float
-
-
 def train(
     config: TrainingConfig | None = None, *, seed: int = 0, progress: Callable[[int, float], None] = lambda *_: None
 ) -> GainNetwork:
@@ -276,11 +268,12 @@ def lessons(config: TrainingConfig) -> tuple[Array, Array, Array]:
     return A, tau, np.repeat(ways, len(delays)) / tau
 
 
-def errors(network: GainNetwork, A: Array, tau: Array) -> Errors:
-    """Relative errors of a network at factors A [1/m] and delays τ [s], (k,) each."""
+def errors(network: GainNetwork, A: Array, tau: Array) -> dict[str, float]:
+    """Relative errors of a network at factors A [1/m] and delays τ [s], (k,) each: `median`, `p99`, `largest`."""
     exact = optimal_ways(A, network.epsilon) / tau
     found = np.abs(network.gains(A, tau) / exact - 1.0)
-    return Errors(float(np.median(found)), float(np.quantile(found, 0.99)), float(found.max()))
+    p99 = float(np.quantile(found, 0.99))
+    return {"median": float(np.median(found)), "p99": p99, "largest": float(found.max())}
 
 
 def examples(ranges: Ranges, count: int, rng: np.random.Generator) -> dict[str, tuple[Array, Array]]:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
 from interfaces.middleware import (
     Controller,
     Formulation,
@@ -19,7 +19,7 @@ from interfaces.middleware import (
     drive_measure,
     train,
 )
-from interfaces.middleware.network import Errors, errors, examples
+from interfaces.middleware.network import errors, examples
 from robots.onboard.driving import Drive, Posture
 from vrs.clock import WallClock
 from vrs.model import Array
@@ -56,7 +56,9 @@ def work(study: Study, _case: str) -> Findings:
         )
         for kind, (worst, _) in guarded.items()
     ]  # fmt: skip
-    rows = [(name, one.epochs, kind, *found[name][kind]) for name, one in networks.items() for kind in chosen]
+    rows: list[tuple[Cell, ...]] = [
+        (name, one.epochs, kind, *found[name][kind].values()) for name, one in networks.items() for kind in chosen
+    ]
     columns = ("network", "epochs", "A", "median", "p99", "largest")
     exact = [(kind, f"{100 * share:.1f} %") for kind, (_, share) in guarded.items()]
     tables = (
@@ -69,11 +71,12 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(tuple(claims), tables, (), (timing,))
 
 
-def accuracy_claims(name: str, found: dict[str, Errors]) -> list[Claim]:
+def accuracy_claims(name: str, found: dict[str, dict[str, float]]) -> list[Claim]:
     """How near a network's gains are to the exact ones, for each kind of input."""
     claims = []
     for kind, one in found.items():
-        for what, value, bar in (("p99", one.p99, P99), ("largest", one.largest, LARGEST)):
+        for what, bar in (("p99", P99), ("largest", LARGEST)):
+            value = one[what]
             text = f"the network {name}, A {kind}: relative error of K, {what} [%]"
             claims.append(Claim(text, f"{SOURCE}; {OWN_BAR}", f"{100 * bar:g} at most", 100 * value, value <= bar))
     return claims
@@ -88,8 +91,7 @@ def guard(network: GainNetwork, given: tuple[Array, Array], count: int) -> tuple
         factor, delay = A[k % len(A)], tau[(k + k // len(A)) % len(tau)]
         slowed = scheduler.schedule(Drive(FASTEST, 2 * factor * FASTEST), delay)
         worst = max(worst, drive_measure(slowed, delay))
-    counts = scheduler.counts
-    return worst / network.epsilon, counts.exact / max(counts.slowed, 1)
+    return worst / network.epsilon, scheduler.exact / max(scheduler.slowed, 1)
 
 
 def step_time(network: GainNetwork, blocks: int = 100) -> float:

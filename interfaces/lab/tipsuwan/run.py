@@ -15,7 +15,6 @@ from interfaces.link import Channel, Conditions, ConstantDelay, DelayProfile, Ec
 from interfaces.link.delays import CORRELATION_TIME
 from interfaces.middleware import (
     ActionAgent,
-    ActionAgentConfig,
     Controller,
     DriveFeedback,
     DriveSetpoint,
@@ -184,8 +183,8 @@ class NetworkRunSetting:
     """α, s_max and β, fixed beforehand; the nearest point is looked for on the whole path, as the paper says."""
     middleware: MiddlewareConfig = field(default_factory=MiddlewareConfig)
     """ε = 0.25, T_p = 5 ms, N = 10."""
-    agent: ActionAgentConfig = field(default_factory=ActionAgentConfig)
-    """T = 10 ms."""
+    period: Annotated[float, within(1e-4, 1.0, "s")] = 0.01
+    """T: between two sampling times [s], in [1e-4, 1]."""
     length: Annotated[float, within(0.1, 3600.0, "s")] = LENGTH
     """Of a run [s], in [0.1, 3600]."""
 
@@ -289,7 +288,7 @@ def run(
         start: Where the robot begins.
     """
     setting = NetworkRunSetting() if setting is None else setting
-    body, steps = make_robot(robot, start, setting.agent.period, seed)
+    body, steps = make_robot(robot, start, setting.period, seed)
     with body:
         return _NetworkRun(curve, driver, delay, np.random.default_rng([seed, 5]), body, steps, setting).whole()
 
@@ -314,12 +313,12 @@ class _NetworkRun:
         self._body, self._steps = body, steps
         self._limits = body.limits
         self._setting = setting
-        self._robot = ActionAgent(setting.agent)
+        self._robot = ActionAgent()
         self._end = curve.at(curve.length)
         self._now = 0.0
 
     def whole(self) -> DriveTrace:
-        period = self._setting.agent.period
+        period = self._setting.period
         rows: list[tuple[float, ...]] = []
         arrived = False
         for k in range(round(self._setting.length / period) + 1):

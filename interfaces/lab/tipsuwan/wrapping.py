@@ -47,7 +47,7 @@ def _pursuit(curve: Curve, _setting: NetworkRunSetting) -> Controller:
 def _field(curve: Curve, setting: NetworkRunSetting) -> Controller:
     """The uni-vector controller on a path of arcs along the curve."""
     path = arcs_of(curve)
-    config = PathFollowingConfig(period=setting.agent.period, cruise=SPEED, limits=LIFTED)
+    config = PathFollowingConfig(period=setting.period, cruise=SPEED, limits=LIFTED)
     return PathFollowingController(path, config).control
 
 

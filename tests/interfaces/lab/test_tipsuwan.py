@@ -273,10 +273,10 @@ def test_the_gains_claims_hold(monkeypatch):
 
 
 def test_the_gains_claims_fail_where_it_is_off_and_name_percent():
-    good = gain.Errors(1e-5, 1e-3, 5e-3)
+    good = {"median": 1e-5, "p99": 1e-3, "largest": 5e-3}
     assert [claim.measured for claim in gain.accuracy_claims("one", {"uniform": good})] == pytest.approx([0.1, 0.5])
     for bad, holds in (({"p99": 1.01e-3}, [False, True]), ({"largest": 5.01e-3}, [True, False])):
-        claims = gain.accuracy_claims("one", {"uniform": good, "other": good._replace(**bad)})
+        claims = gain.accuracy_claims("one", {"uniform": good, "other": good | bad})
         assert [claim.holds for claim in claims] == [True, True, *holds]
 
 
@@ -333,11 +333,12 @@ def test_the_paper_is_in_the_list():
     assert ARRIVAL == 0.05
     tracker = SETTING.tracker
     assert (tracker.alpha, tracker.s_max, tracker.beta, SETTING.middleware.epsilon) == (2.0, 0.3, 0.1, 0.25)
-    assert (SETTING.middleware.probing.period, SETTING.agent.period) == (0.005, 0.01)
+    assert (SETTING.middleware.probing.period, SETTING.period) == (0.005, 0.01)
 
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: NetworkRunSetting(length=0.0), "length must be"),
+    (lambda: NetworkRunSetting(period=0.0), "period must be"),
     (lambda: leg(0.01), "median must be"),
     (lambda: leg(0.2, -1.0), "correlation time must be"),
     (lambda: PredictiveConfig(period=0.2), "period must be"),

@@ -10,7 +10,6 @@ from interfaces.link import ProbeConfig
 from interfaces.link.round_trip import Probe
 from interfaces.middleware import (
     ActionAgent,
-    ActionAgentConfig,
     DriveFeedback,
     DriveSetpoint,
     GainSchedulingMiddleware,
@@ -71,7 +70,7 @@ def test_the_median_predicts_and_the_mean_slows():
     assert controller.postures == [predicted(HERE, driving, 0.1)]
     assert drive_measure(command.drive, 0.2) == pytest.approx(0.25)
     assert command.drive.w / command.drive.v == pytest.approx(0.5)
-    assert middleware.counts.slowed == 1
+    assert middleware.scheduler.slowed == 1
 
 
 @pytest.mark.parametrize(("predicts", "schedules"), [(True, False), (False, True), (False, False)])
@@ -122,7 +121,7 @@ def test_a_command_behind_a_newer_one_is_stale():
 
 
 def test_a_starved_robot_stands_and_goes_on_with_the_next_command():
-    robot = ActionAgent(ActionAgentConfig(starved=0.3))
+    robot = ActionAgent(starved=0.3)
     robot.receive(DriveSetpoint(0, Drive(0.4, 0.0)), now=1.0)
     assert robot.driving(now=1.29) == (0.4, 0.0)
     assert robot.driving(now=1.31) == STAND
@@ -157,8 +156,7 @@ def test_any_controller_goes_behind_it_unchanged():
 
 
 @pytest.mark.parametrize(("make", "bad"), [
-    (MiddlewareConfig, {"epsilon": 0.0}), (ProbeConfig, {"period": 0.0}),
-    (ActionAgentConfig, {"period": 0.0}), (ActionAgentConfig, {"starved": math.nan}),
+    (MiddlewareConfig, {"epsilon": 0.0}), (ProbeConfig, {"period": 0.0}), (ActionAgent, {"starved": math.nan}),
 ])  # fmt: skip
 def test_impossible_configurations_are_refused(make, bad):
     with pytest.raises(InvalidValueError):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from interfaces.middleware.middleware import GainScheduler, ScheduleCounts
+from interfaces.middleware.middleware import GainScheduler
 from interfaces.middleware.network import Formulation, TrainingConfig, default_network, examples, train
 from interfaces.middleware.performance import drive_measure, optimal_gain
 from robots.onboard.driving import Drive
@@ -56,9 +56,8 @@ def test_the_guard_holds_over_the_papers_ranges(kind):
     assert worst <= 0.25 * (1 + 1e-9)
     # And nothing is slowed more than the network errs.
     assert least >= 0.25 * (1 - 5e-3)
-    counts = scheduler.counts
-    assert counts.drives == counts.slowed == 50_000
-    assert 0 < counts.exact < 50_000
+    assert scheduler.drives == scheduler.slowed == 50_000
+    assert 0 < scheduler.exact < 50_000
 
 
 def test_without_a_network_the_gain_is_the_exact_one():
@@ -66,7 +65,7 @@ def test_without_a_network_the_gain_is_the_exact_one():
     slowed = scheduler.schedule(Drive(-2.0, 4.0), 0.2)
     K = optimal_gain(-1.0, 0.2, 0.25)
     assert slowed == pytest.approx((-K, 2 * K))
-    assert scheduler.counts == ScheduleCounts(drives=1, slowed=1, exact=1)
+    assert (scheduler.drives, scheduler.slowed, scheduler.exact) == (1, 1, 1)
 
 
 def test_turns_on_the_spot_and_straight_lines():
@@ -82,7 +81,7 @@ def test_outside_of_its_ranges_the_network_isnt_asked():
     scheduler = GainScheduler(0.25, WILD)
     far = scheduler.schedule(Drive(2.0, 0.0), 5.0)
     assert far.v == pytest.approx(0.05)
-    assert scheduler.counts.exact == 1
+    assert scheduler.exact == 1
 
 
 @pytest.mark.parametrize(("drive", "tau", "said"), [
@@ -93,7 +92,7 @@ def test_senseless_drives_and_delays_are_refused(drive, tau, said):
     scheduler = GainScheduler(0.25, NETWORK)
     with pytest.raises(InvalidValueError, match=said):
         scheduler.schedule(Drive(*drive), tau)
-    assert scheduler.counts.drives == 0
+    assert scheduler.drives == 0
 
 
 def test_a_network_of_another_tolerance_is_refused():
