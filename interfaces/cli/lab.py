@@ -221,10 +221,10 @@ def lab(
         summary,
         write,
     )
-    from interfaces.lab.driving.run import Kept, measure_recorded, paths
+    from interfaces.lab.driving.run import measure_recorded, paths
     from interfaces.lab.driving.sweep import attributed, cases
     from interfaces.link.delays import delay_profile
-    from interfaces.runs.drive_run import DriveCase
+    from interfaces.runs.drive_run import DriveCase, DriveRun, Row
     from interfaces.teleop.architectures import Constants, Transport, controller
     from interfaces.teleop.architectures.compositions import POSITIONS
     from robots.onboard.driving import Posture
@@ -253,8 +253,8 @@ def lab(
     chosen = [replace(case, position=position) for case in combined]
     files = paths(chosen, out) if record else [None] * len(chosen)
     calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
-    measured: list[Kept] = _worked(calls, "runs", workers)
-    rows = [kept.row for kept in measured]
+    measured: list[tuple[Row, DriveRun | None, str]] = _worked(calls, "runs", workers)
+    rows, drives, problems = map(list, zip(*measured, strict=True))
     causes = []
     if attribution:
         taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
@@ -265,8 +265,8 @@ def lab(
         "length_s": length,
     }  # fmt: skip
     found = summary(rows, settings, causes)
-    write(rows, found, pictures([kept.drive for kept in measured if kept.drive is not None]), out)
-    for problem in dict.fromkeys(kept.problem for kept in measured if kept.problem):
+    write(rows, found, pictures([drive for drive in drives if drive is not None]), out)
+    for problem in dict.fromkeys(filter(None, problems)):
         typer.echo(f"vrs: {problem}", err=True)
     if as_json:
         import json

@@ -33,10 +33,10 @@ class Measures:
 
 @dataclass(frozen=True, slots=True)
 class Attribution:
-    """One measure, split: parts and residual add up to the total."""
+    """One measure of a run or a drive, split: parts and residual add up to the total."""
 
     measure: str
-    """Name of a field of Measures; its last part is the unit."""
+    """Name of a field of Measures, whose last part is the unit, or of PathComparison."""
     total: float
     parts: tuple[tuple[str, float], ...]
     """Cause, and by how much the measure fell when it was switched off, in that order."""

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from interfaces.lab.claims import Figure
-from interfaces.lab.driving.sweep import CAUSES, DriveAttribution, Group, grouped, paired
+from interfaces.lab.driving.sweep import CAUSES, Group, grouped, paired
 from interfaces.lab.output import BAD, REAL, VIRTUAL, draw, legend, write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
 from interfaces.runs.drive_run import COLUMNS, KEYS, METRICS, DriveCase, DriveRun, Row, cell, values_of
+from interfaces.runs.summary import Attribution
 from vrs.comparison import PathMatch
 
 if TYPE_CHECKING:
@@ -113,20 +114,18 @@ def _estimate(found: Estimate | None) -> dict[str, Any] | None:
     return value if found.level == LEVEL else value | {"level": found.level}
 
 
-def attributions(
-    chosen: Sequence[DriveCase], found: Sequence[tuple[DriveAttribution, ...]]
-) -> list[dict[str, Any]]:
+def attributions(chosen: Sequence[DriveCase], found: Sequence[tuple[Attribution, ...]]) -> list[dict[str, Any]]:
     """What each cause does, means over seeds, an entry a combination and figure, as JSON takes them."""
-    groups: dict[tuple[tuple[str, ...], str], list[DriveAttribution]] = {}
+    groups: dict[tuple[tuple[str, ...], str], list[Attribution]] = {}
     for case, parts in zip(chosen, found, strict=True):
         for one in parts:
-            groups.setdefault((case.group, one.figure), []).append(one)
+            groups.setdefault((case.group, one.measure), []).append(one)
     return [
         {
             **dict(zip(KEYS, key, strict=True)),
             "figure": figure,
             "total": _mean([one.total for one in members]),
-            "parts": {cause: _mean([one.parts[k] for one in members]) for k, cause in enumerate(CAUSES)},
+            "parts": {cause: _mean([one.parts[k][1] for one in members]) for k, cause in enumerate(CAUSES)},
             "residual": _mean([one.residual for one in members]),
         }
         for (key, figure), members in groups.items()
@@ -166,11 +165,11 @@ def summary(rows: Sequence[Row], settings: dict[str, Any], causes: Sequence[dict
         "attribution": list(causes),
         "paired": [
             {
-                "metric": found.metric,
-                "first": dict(zip(KEYS, found.first, strict=True)),
-                "second": dict(zip(KEYS, found.second, strict=True)),
-                "difference": _estimate(found.difference),
-                "verdict": found.verdict,
+                "metric": metric,
+                "first": dict(zip(KEYS, first.key, strict=True)),
+                "second": dict(zip(KEYS, second.key, strict=True)),
+                "difference": _estimate(found[0]),
+                "verdict": found[1],
             }
             for first, second in combinations(groups, 2)
             # The same network, robot and operator.

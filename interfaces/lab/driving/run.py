@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -206,18 +206,18 @@ _PLAIN: Final = re.compile(r"[A-Za-z0-9.+@:-]+\Z")
 _OTHERS: Final = re.compile(r"[^A-Za-z0-9.+-]")
 
 
-class Kept(NamedTuple):
-    """What is left of a run."""
+def measure_recorded(case: DriveCase, keep: bool, path: Path | None) -> tuple[Row, DriveRun | None, str]:
+    """Run a case.
 
-    row: Row
-    drive: DriveRun | None
-    """All of it, where that's to be drawn."""
-    problem: str
-    """Why its recording isn't there; empty where it is, or wasn't asked for."""
+    Args:
+        case: What to run.
+        keep: Whether all of it is kept, as it's to be drawn.
+        path: Where its recording goes, if there's to be one.
 
-
-def measure_recorded(case: DriveCase, keep: bool, path: Path | None) -> Kept:
-    """Run a case and keep its figures, all of it if that's to be drawn, and its recording if that has a path."""
+    Returns:
+        Its figures; all of it, where that's kept; and why its recording isn't there, empty where it is, or wasn't
+        asked for.
+    """
     if path is None:
         drive, problem = run(case), ""
     else:
@@ -227,7 +227,7 @@ def measure_recorded(case: DriveCase, keep: bool, path: Path | None) -> Kept:
         drive = run(case, witness=recorder)
         recorder.finish(drive)
         problem = recorder.problem
-    return Kept(row_of(drive), drive if keep else None, problem)
+    return row_of(drive), drive if keep else None, problem
 
 
 def paths(chosen: Sequence[DriveCase], out: Path) -> list[Path | None]:

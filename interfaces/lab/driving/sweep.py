@@ -14,6 +14,7 @@ from interfaces.lab.driving.run import run
 from interfaces.lab.runner import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.runs.drive_run import DriveCase, Row, row_of
+from interfaces.runs.summary import Attribution
 from interfaces.teleop.architectures import Transport
 from interfaces.teleop.architectures.compositions import SENSING
 from robots.ipr.chassis import MobileReality
@@ -100,23 +101,14 @@ def grouped(rows: Iterable[Row]) -> list[Group]:
     return [Group(key, tuple(members)) for key, members in found.items()]
 
 
-@dataclass(frozen=True, slots=True)
-class Paired:
-    """A metric of one combination beside another's, seed by seed."""
-
-    metric: str
-    first: tuple[str, ...]
-    second: tuple[str, ...]
-    difference: Estimate
-    """Mean of first − second, with its interval."""
-    verdict: str
-    """`below`, `above` (the interval doesn't touch zero), `equal` (within 10 %), `unclear`, as of few seeds."""
-
-
-def paired(first: Group, second: Group, metric: str) -> Paired | None:
-    """Compare two combinations in a metric; None if they have no seeds in common that have it.
+def paired(first: Group, second: Group, metric: str) -> tuple[Estimate, str] | None:
+    """Compare two combinations in a metric, seed by seed; None if they have no seeds in common that have it.
 
     Of runs with a progress below 97 % the time difference is taken by its bound, other means not at all.
+
+    Returns:
+        Mean of first − second with its interval, and a verdict: `below`, `above` (the interval doesn't touch zero),
+        `equal` (within 10 %), `unclear`, as of few seeds.
     """
     one, other = ({row.seed: comparable(row.metrics, metric) for row in group.rows} for group in (first, second))
     pairs = [
@@ -136,7 +128,7 @@ def paired(first: Group, second: Group, metric: str) -> Paired | None:
         verdict = "unclear"
     if abs(a.mean() - b.mean()) <= EQUAL * max(abs(a.mean()), abs(b.mean())):
         verdict = "equal"
-    return Paired(metric, first.key, second.key, difference, verdict)
+    return difference, verdict
 
 
 def comparable(metrics: PathComparison, metric: str) -> float | None:
@@ -156,21 +148,8 @@ FIGURES: Final = ("path_error_mean", "time_difference_mean")
 """What is taken apart."""
 
 
-@dataclass(frozen=True, slots=True)
-class DriveAttribution:
-    """A figure of a case, taken apart."""
-
-    figure: str
-    total: float
-    """With all causes on."""
-    parts: tuple[float, ...]
-    """Of each of `CAUSES`."""
-    residual: float
-    """With all causes off."""
-
-
-def attributed(case: DriveCase, whole: PathComparison | None = None) -> tuple[DriveAttribution, ...]:
-    """Run a case with ever fewer causes of error.
+def attributed(case: DriveCase, whole: PathComparison | None = None) -> tuple[Attribution, ...]:
+    """Take apart a case's `FIGURES`: run it with ever fewer of its `CAUSES` of error.
 
     Args:
         case: With its own reality, position and network.
@@ -186,8 +165,8 @@ def attributed(case: DriveCase, whole: PathComparison | None = None) -> tuple[Dr
     made = []
     for figure in FIGURES:
         values: Sequence[float] = [getattr(one, figure) or 0.0 for one in found]
-        parts = tuple(a - b for a, b in pairwise(values))
-        made.append(DriveAttribution(figure, values[0], parts, values[-1]))
+        parts = tuple((cause, a - b) for cause, (a, b) in zip(CAUSES, pairwise(values), strict=True))
+        made.append(Attribution(figure, values[0], parts, values[-1]))
     return tuple(made)
 
 

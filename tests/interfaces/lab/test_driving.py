@@ -14,7 +14,7 @@ from interfaces.cli.main import app
 from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.output import COMPARED, summary
 from interfaces.lab.driving.run import run
-from interfaces.lab.driving.sweep import attributed, cases, grouped, measure, paired, sweep
+from interfaces.lab.driving.sweep import CAUSES, attributed, cases, grouped, measure, paired, sweep
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 from robots.ipr.chassis import MobileReality
@@ -144,7 +144,7 @@ def test_a_paired_difference_has_a_verdict() -> None:
     def verdict(first: list[float], second: list[float]) -> str:
         found = paired(group("a", first), group("b", second), "path_error_max")  # type: ignore[arg-type]
         assert found is not None
-        return found.verdict
+        return found[1]
 
     low, high = [0.01, 0.012, 0.011, 0.013, 0.01], [0.03, 0.05, 0.04, 0.06, 0.05]
     assert verdict(low, high) == "below"
@@ -212,13 +212,15 @@ def test_causes_add_up_and_are_those_that_were_made(architecture: str) -> None:
     case = DriveCase(architecture, Transport.STREAM, "constant:1.5", "bare", "corridor", 0, 40.0)
     path, late = attributed(case)
     for found in (path, late):
-        assert sum(found.parts) + found.residual == pytest.approx(found.total, rel=1e-9)
-    assert late.parts[0] == pytest.approx(1.5, abs=0.3)
-    assert abs(late.parts[1]) + abs(late.parts[2]) < 0.3
+        assert sum(value for _, value in found.parts) + found.residual == pytest.approx(found.total, rel=1e-9)
+        assert tuple(cause for cause, _ in found.parts) == CAUSES
+    of_path, of_time = dict(path.parts), dict(late.parts)
+    assert of_time["delay"] == pytest.approx(1.5, abs=0.3)
+    assert abs(of_time["model"]) + abs(of_time["localization"]) < 0.3
     if architecture == "II":
         # Nobody corrects what slip and wrong wheels do.
-        assert path.parts[1] > 0.5 * path.total
-        assert path.parts[2] == pytest.approx(0.0, abs=1e-9)
+        assert of_path["model"] > 0.5 * path.total
+        assert of_path["localization"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_odometry_alone_drifts() -> None:
