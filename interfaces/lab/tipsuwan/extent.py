@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from interfaces.lab.claims import Cell, Figure, Findings, Study, Table
 from interfaces.lab.output import INK, draw
-from interfaces.lab.tipsuwan.run import NetworkControl, NetworkRunSetting, agent, leg, no_delay, run, s_path
-from interfaces.lab.tipsuwan.success import MOST_RATIO, SuccessResult, seen, succeeds
+from interfaces.lab.tipsuwan.run import (
+    NetworkControl,
+    NetworkRunSetting,
+    PathMeasures,
+    agent,
+    leg,
+    measured,
+    no_delay,
+    run,
+    s_path,
+)
+from interfaces.lab.tipsuwan.success import MOST_RATIO, succeeds
 from interfaces.link import DelayProfile
 from interfaces.link.delays import CORRELATION_TIME
 
@@ -43,26 +53,21 @@ WHY: Final = {
 LETTERS: Final = "; ".join(f"{letter} {why}" for letter, why in WHY.items() if letter != "·")
 
 
-class Varied(NamedTuple):
-    """What a row of a map is about."""
-
-    setting: NetworkRunSetting
-    t_pred: float | None = None
-    """Of the paths at each delay; None for the same paths at all of them [s]."""
-    correlation_time: float = CORRELATION_TIME
-    """Of the delays [s]."""
+MapRow: TypeAlias = tuple[NetworkRunSetting, float | None, float]
+"""What a row of a map is about: what its runs have in common, T_pred of its paths at each delay [s], or None for
+the same paths at all of them, and the correlation time of the delays [s]."""
 
 
-def varied(axis: str, value: float, length: float) -> Varied:
+def varied(axis: str, value: float, length: float) -> MapRow:
     """Everything as it is fixed but for what an axis varies; runs of a length [s]."""
     setting = NetworkRunSetting(length=length)
     if axis == "T_pred":
-        return Varied(setting, t_pred=value)
+        return setting, value, CORRELATION_TIME
     if axis == "correlation":
-        return Varied(setting, correlation_time=value)
+        return setting, None, value
     tracker = setting.tracker
     tracker = replace(tracker, alpha=value) if axis == "alpha" else replace(tracker, s_max=value)
-    return Varied(replace(setting, tracker=tracker))
+    return replace(setting, tracker=tracker), None, CORRELATION_TIME
 
 
 def work(study: Study, case: str) -> dict[float, tuple[str, ...]]:
@@ -73,14 +78,15 @@ def work(study: Study, case: str) -> dict[float, tuple[str, ...]]:
     return {tau: tuple(outcome_letter(number, tau, row) for number in numbers) for tau in TAUS}
 
 
-def outcome_letter(number: int, tau: float, row: Varied) -> str:
+def outcome_letter(number: int, tau: float, row: MapRow) -> str:
     """One path at one delay: a letter of `WHY`."""
-    curve = s_path(number, NOMINAL_T_PRED) if row.t_pred is None else s_path(number, row.t_pred, tau=tau)
+    setting, t_pred, correlation_time = row
+    curve = s_path(number, NOMINAL_T_PRED) if t_pred is None else s_path(number, t_pred, tau=tau)
 
-    def drive(control: NetworkControl, delay: DelayProfile) -> SuccessResult:
-        return seen(run(curve, agent(control, curve, row.setting), delay, number, setting=row.setting))
+    def drive(control: NetworkControl, delay: DelayProfile) -> PathMeasures:
+        return measured(run(curve, agent(control, curve, setting), delay, number, setting=setting))
 
-    network = leg(tau, row.correlation_time)
+    network = leg(tau, correlation_time)
     ideal = drive(NetworkControl.DIRECT, no_delay())
     if not ideal.arrived:
         return "n"

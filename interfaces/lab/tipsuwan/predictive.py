@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -26,63 +26,50 @@ from vrs.checks import number_in
 from vrs.mobile import advanced, clipped, wrapped
 from vrs.model import Array
 
-
-@dataclass(frozen=True, slots=True)
-class PredictiveConfig:
-    """Constants of the controller; chosen once, for no path and no network."""
-
-    step: float = 0.1
-    """Of the horizon [s], in [0.01, 1]."""
-    horizon: int = 10
-    """Steps, in [1, 100]."""
-    period: float = 0.05
-    """Between two plans [s], in [1e-3, 1], no longer than a step."""
-    lag: float = 0.0
-    """Of the robot's motors, after which a drive takes effect [s], in [0, 1]."""
-    cruise: float = 1.5
-    """Speed of the reference on a straight line [m/s], in [0.01, 10]."""
-    lateral: float = 1.5
-    """Its largest acceleration across the path [m/s²], in [0.01, 100]."""
-    along: float = 1.5
-    """Its largest acceleration along the path [m/s²], in [0.01, 100]: it brakes for bends, and for the end."""
-    turning: float = 8.0
-    """Largest change of ω [rad/s²], in [0.01, 1000]."""
-    slowest: float = 0.1
-    """Speed at the path's end [m/s], in [1e-3, 1]."""
-    v_max: float = 2.0
-    """Largest |v| [m/s], in [0.01, 10]: the tracker's α."""
-    w_max: float = 4.0
-    """Largest |ω| [rad/s], in [0.01, 100]: the tracker's 2α."""
-    weights: tuple[float, float, float] = (1.0, 4.0, 0.5)
-    """Of the errors along and across the path [1/m] and of the heading [1/rad], not negative."""
-    effort: tuple[float, float] = (0.1, 0.06)
-    """Of the changes of v and ω from step to step [s/m, s/rad], positive."""
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("step", 0.01, 1.0), ("horizon", 1, 100), ("period", 1e-3, self.step), ("lag", 0.0, 1.0),
-            ("cruise", 0.01, 10.0), ("lateral", 0.01, 100.0), ("along", 0.01, 100.0), ("turning", 0.01, 1000.0),
-            ("slowest", 1e-3, 1.0), ("v_max", 0.01, 10.0), ("w_max", 0.01, 100.0),
-        ):  # fmt: skip
-            number_in(name, getattr(self, name), low, high)
-        for name, value in (*(("weights", one) for one in self.weights), *(("effort", one) for one in self.effort)):
-            number_in(name, value, 1e-9 if name == "effort" else 0.0, 1e6)
+STEP: Final = 0.1
+"""Of the horizon [s]."""
+HORIZON: Final = 10
+"""Steps."""
+PERIOD: Final = 0.05
+"""Between two plans [s], no longer than a step."""
+CRUISE: Final = 1.5
+"""Speed of the reference on a straight line [m/s]."""
+LATERAL: Final = 1.5
+"""Its largest acceleration across the path [m/s²]."""
+ALONG: Final = 1.5
+"""Its largest acceleration along the path [m/s²]: it brakes for bends, and for the end."""
+TURNING: Final = 8.0
+"""Largest change of ω [rad/s²]."""
+SLOWEST: Final = 0.1
+"""Speed at the path's end [m/s]."""
+V_MAX, W_MAX = 2.0, 4.0
+"""Largest |v| [m/s] and |ω| [rad/s]: the tracker's α and 2α."""
+WEIGHTS: Final = (1.0, 4.0, 0.5)
+"""Of the errors along and across the path [1/m] and of the heading [1/rad]."""
+EFFORT: Final = (0.1, 0.06)
+"""Of the changes of v and ω from step to step [s/m, s/rad]."""
 
 
 class PredictiveController:
     """Stands where the middleware and its tracker do; sans I/O."""
 
-    def __init__(self, curve: Curve, probing: ProbeConfig, config: PredictiveConfig | None = None) -> None:
-        """Take the path, and how to probe the network."""
+    def __init__(self, curve: Curve, probing: ProbeConfig, lag: float = 0.0) -> None:
+        """Take the path, and how to probe the network.
+
+        Args:
+            curve: The path.
+            probing: How the network is probed.
+            lag: Of the robot's motors, after which a drive takes effect [s], in [0, 1].
+        """
         self._curve = curve
-        self._config = PredictiveConfig() if config is None else config
+        self._lag = number_in("lag", lag, 0.0, 1.0)
         self._traffic = RoundTripEstimator(0, probing)
         self._on_the_way: deque[tuple[float, Drive]] = deque([(-math.inf, STAND)])
         """When each command was sent [s], and what it was."""
         self._heard, self._sent = -1, 0
         self._due = -math.inf
         self._s: float | None = None
-        self._ways, self._allowed = _speeds(curve, self._config)
+        self._ways, self._allowed = _speeds(curve)
 
     def next_deadline(self) -> float:
         """When the next probe is due [s]."""
@@ -103,7 +90,7 @@ class PredictiveController:
         self._heard = message.number
         if now < self._due:
             return None
-        self._due = now + self._config.period
+        self._due = now + PERIOD
         drive = self._planned(self._carried_on(message.posture, now, tau))
         self._on_the_way.append((now, drive))
         self._sent += 1
@@ -111,7 +98,7 @@ class PredictiveController:
 
     def _carried_on(self, posture: Posture, now: float, tau: float) -> Posture:
         """Where the robot will be when what is sent now takes effect: what was sent since then moves it."""
-        sent, since = self._on_the_way, now - tau - self._config.lag
+        sent, since = self._on_the_way, now - tau - self._lag
         while len(sent) > 1 and sent[1][0] <= since:
             sent.popleft()
         at: tuple[float, float, float] = posture
@@ -123,32 +110,32 @@ class PredictiveController:
     def _planned(self, posture: Posture) -> Drive:
         from scipy.optimize import lsq_linear
 
-        config, n = self._config, self._config.horizon
+        n = HORIZON
         places, speeds = self._reference(posture)
         free, driven, wanted = self._predicted(posture, places, speeds)
         before = self._on_the_way[-1][1]
         # What is looked for are changes: drive k is the one before plus all changes up to k.
         summed = np.kron(np.tril(np.ones((n, n))), np.eye(2))
-        weights = np.tile(config.weights, n)[:, None]
-        rows = np.concatenate([weights * (driven @ summed), np.diag(np.tile(config.effort, n))])
+        weights = np.tile(WEIGHTS, n)[:, None]
+        rows = np.concatenate([weights * (driven @ summed), np.diag(np.tile(EFFORT, n))])
         missed = free + driven @ (np.tile(before, n) - wanted)
         right = np.concatenate([-weights[:, 0] * missed, np.zeros(2 * n)])
-        most = config.step * np.tile((config.along, config.turning), n)
-        most[:2] *= config.period / config.step
+        most = STEP * np.tile((ALONG, TURNING), n)
+        most[:2] *= PERIOD / STEP
         change = lsq_linear(rows, right, (-most, most), method="bvls").x
         v, w = before.v + float(change[0]), before.w + float(change[1])
-        return Drive(clipped(v, config.v_max), clipped(w, config.w_max))
+        return Drive(clipped(v, V_MAX), clipped(w, W_MAX))
 
     def _reference(self, posture: Posture) -> tuple[list[CurvePoint], list[float]]:
         """Where the robot should be at each step, and how fast on the way to the next one."""
-        config, curve = self._config, self._curve
+        curve = self._curve
         self._s = s = curve.nearest(posture.x, posture.y, around=self._s, window=1.0)
         places, speeds = [curve.at(s)], []
         speed = max(self._on_the_way[-1][1].v, 0.0)
-        for _ in range(config.horizon):
-            speed = min(speed + config.along * config.step, self._allowed[bisect_right(self._ways, s) - 1])
-            ahead = min(s + speed * config.step, curve.length)
-            speeds.append((ahead - s) / config.step)
+        for _ in range(HORIZON):
+            speed = min(speed + ALONG * STEP, self._allowed[bisect_right(self._ways, s) - 1])
+            ahead = min(s + speed * STEP, curve.length)
+            speeds.append((ahead - s) / STEP)
             s = ahead
             places.append(curve.at(s))
         return places, speeds
@@ -160,7 +147,7 @@ class PredictiveController:
 
         An error is along and across the reference's heading, and in heading.
         """
-        n, dt = self._config.horizon, self._config.step
+        n, dt = HORIZON, STEP
         free, driven, wanted = np.zeros((n, 3)), np.zeros((n, 3, 2 * n)), np.zeros(2 * n)
         error, by = _error(posture, places[0]), np.zeros((3, 2 * n))
         for k, (place, after, v) in enumerate(zip(places, places[1:], speeds, strict=False)):
@@ -176,15 +163,15 @@ class PredictiveController:
         return free.ravel(), driven.reshape(3 * n, 2 * n), wanted
 
 
-def _speeds(curve: Curve, config: PredictiveConfig) -> tuple[list[float], list[float]]:
+def _speeds(curve: Curve) -> tuple[list[float], list[float]]:
     """Ways along the path [m], and how fast the reference may be there [m/s], from the end backwards."""
     s, _, bend = curve.table
-    allowed = np.minimum(config.cruise, np.sqrt(config.lateral / np.maximum(bend, 1e-9))).tolist()
-    allowed[-1] = config.slowest
+    allowed = np.minimum(CRUISE, np.sqrt(LATERAL / np.maximum(bend, 1e-9))).tolist()
+    allowed[-1] = SLOWEST
     ways = s.tolist()
     for k in range(len(ways) - 2, -1, -1):
-        before = math.sqrt(allowed[k + 1] ** 2 + 2 * config.along * (ways[k + 1] - ways[k]))
-        allowed[k] = max(min(allowed[k], before), config.slowest)
+        before = math.sqrt(allowed[k + 1] ** 2 + 2 * ALONG * (ways[k + 1] - ways[k]))
+        allowed[k] = max(min(allowed[k], before), SLOWEST)
     return ways, allowed
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Final, NamedTuple, Protocol
+from typing import Annotated, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from interfaces.engine_server.site import earliest
-from interfaces.lab.tipsuwan.predictive import PredictiveConfig, PredictiveController
+from interfaces.lab.tipsuwan.predictive import PredictiveController
 from interfaces.link import Channel, Conditions, ConstantDelay, DelayProfile, Echo, HeavyTailedDelay, Probe
 from interfaces.link.delays import CORRELATION_TIME
 from interfaces.middleware import (
@@ -159,17 +159,8 @@ LAGS: Final = {"kinematic": 0.0, "ipr": 0.05}
 """What the model-predictive controller knows of their motors [s]."""
 
 
-class Agent(Protocol):
-    """What is at the other end of the network from the robot."""
-
-    def next_deadline(self) -> float | None:
-        """When it has something to send by itself [s]."""
-
-    def to_send(self, *, now: float) -> Probe | None:
-        """A probe that is due."""
-
-    def receive(self, message: Echo | DriveFeedback, *, now: float) -> DriveSetpoint | None:
-        """Take what the robot sent."""
+Agent: TypeAlias = GainSchedulingMiddleware | PredictiveController
+"""What is at the other end of the network from the robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,8 +220,7 @@ def no_delay() -> DelayProfile:
 def agent(control: NetworkControl, curve: Curve, setting: NetworkRunSetting, robot: str = "kinematic") -> Agent:
     """Make what drives a robot along a curve."""
     if control is NetworkControl.PREDICTIVE:
-        config = PredictiveConfig(lag=LAGS[one_of("robot", robot, ROBOTS)])
-        return PredictiveController(curve, setting.middleware.probing, config)
+        return PredictiveController(curve, setting.middleware.probing, LAGS[one_of("robot", robot, ROBOTS)])
     return behind(control, QuadraticCurveTracker(curve, setting.tracker).control, setting.middleware)
 
 
@@ -407,6 +397,9 @@ def beside(track: DriveTrace) -> tuple[Array, Array]:
 class PathMeasures(NamedTuple):
     """What is said of a run."""
 
+    arrived: bool
+    seconds: float
+    """How long it took [s]."""
     error: float
     """Mean distance of the robot from the path until it arrived, or the run was over [m]."""
     progress: float
@@ -419,7 +412,8 @@ def measured(track: DriveTrace) -> PathMeasures:
     """Measure a run."""
     away, ways = beside(track)
     progress = 1.0 if track.arrived else float(ways.max()) / track.curve.length
-    return PathMeasures(float(np.abs(away).mean()), progress, _reason(track, away, ways))
+    error, reason = float(np.abs(away).mean()), _reason(track, away, ways)
+    return PathMeasures(track.arrived, float(track.t[-1]), error, progress, reason)
 
 
 def _reason(track: DriveTrace, away: Array, ways: Array) -> Reason:

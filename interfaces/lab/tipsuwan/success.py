@@ -20,7 +20,7 @@ from interfaces.lab.tipsuwan.run import (
     DriveTrace,
     NetworkControl,
     NetworkRunSetting,
-    Reason,
+    PathMeasures,
     agent,
     beside,
     measured,
@@ -54,38 +54,20 @@ BEHIND: Final = (NetworkControl.NETWORK, NetworkControl.EXACT)
 """What success is asked of."""
 
 
-class SuccessResult(NamedTuple):
-    """Figures of a run."""
-
-    arrived: bool
-    seconds: float
-    """How long it took [s]."""
-    error: float
-    """Mean distance from the path [m]."""
-    progress: float
-    """Share of the path that was made."""
-    reason: Reason
-
-
 class PathSuccess(NamedTuple):
     """Of one robot on one path."""
 
     t_pred: float
     """For the longest median round trip [s]."""
-    ideal: SuccessResult
+    ideal: PathMeasures
     """Without delay."""
-    runs: dict[NetworkControl, tuple[SuccessResult, ...]]
+    runs: dict[NetworkControl, tuple[PathMeasures, ...]]
     """A run a delay seed."""
     tracks: dict[str, DriveTrace]
     """Those of the first path and seed, for the picture; none but there."""
 
 
-def seen(track: DriveTrace) -> SuccessResult:
-    """Sum up a run."""
-    return SuccessResult(track.arrived, float(track.t[-1]), *measured(track))
-
-
-def succeeds(ideal: SuccessResult, without: SuccessResult, behind: SuccessResult) -> bool:
+def succeeds(ideal: PathMeasures, without: PathMeasures, behind: PathMeasures) -> bool:
     """Whether the claim is so: it arrives without delay, not with delay alone, and with middleware well."""
     arrivals = ideal.arrived and behind.arrived and not without.arrived
     return arrivals and behind.error <= MOST_RATIO * without.error
@@ -104,17 +86,17 @@ def ran(study: Study, robot: str, curve: Curve, controls: Sequence[NetworkContro
     ideal = run(
         curve, agent(NetworkControl.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting
     )
-    runs: dict[NetworkControl, list[SuccessResult]] = {}
+    runs: dict[NetworkControl, list[PathMeasures]] = {}
     tracks = {IDEAL: ideal}
     for k in range(study.seed, study.seed + study.runs):
         for control in controls:
             track = run(
                 curve, agent(control, curve, setting, robot), network_of(k), k, robot=robot, setting=setting
             )
-            runs.setdefault(control, []).append(seen(track))
+            runs.setdefault(control, []).append(measured(track))
             tracks.setdefault(LABELS[control], track)
     found = {control: tuple(them) for control, them in runs.items()}
-    return PathSuccess(predicted_time(curve, SLOWEST, setting.middleware.epsilon), seen(ideal), found, tracks)
+    return PathSuccess(predicted_time(curve, SLOWEST, setting.middleware.epsilon), measured(ideal), found, tracks)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
@@ -191,7 +173,7 @@ def _paths(robot: str, paths: Sequence[PathSuccess]) -> Table:
     return Table(f"{robot}_paths", f"{robot}: path by path", columns, tuple(rows))
 
 
-def reasons(runs: Sequence[SuccessResult]) -> str:
+def reasons(runs: Sequence[PathMeasures]) -> str:
     """How many runs failed for which reason, the most frequent one first."""
     counted = Counter(one.reason for one in runs if not one.arrived)
     return ", ".join(f"{why} {many}" for why, many in counted.most_common())

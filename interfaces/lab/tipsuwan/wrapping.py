@@ -16,13 +16,15 @@ from interfaces.lab.tipsuwan.run import (
     ROBOTS,
     NetworkControl,
     NetworkRunSetting,
+    PathMeasures,
     behind,
+    measured,
     network_of,
     no_delay,
     run,
     s_path,
 )
-from interfaces.lab.tipsuwan.success import SuccessResult, reasons, seen
+from interfaces.lab.tipsuwan.success import reasons
 from interfaces.middleware import Controller
 from robots.onboard.curve import Curve
 from robots.onboard.curve_trackers import PurePursuit, PurePursuitConfig, QuadraticCurveTracker
@@ -72,11 +74,11 @@ CONTROLLERS: Final[dict[str, Callable[[Curve, NetworkRunSetting], Controller]]] 
 CASES: Final = tuple(f"{robot}/{name}" for robot in ROBOTS for name in CONTROLLERS)
 
 
-def work(study: Study, case: str) -> dict[str, tuple[SuccessResult, ...]]:
+def work(study: Study, case: str) -> dict[str, tuple[PathMeasures, ...]]:
     """A controller on a robot: without delay, with delay alone, and behind the middleware; a run a path each."""
     robot, name = case.split("/")
     setting = NetworkRunSetting(length=study.length)
-    found: dict[str, list[SuccessResult]] = {}
+    found: dict[str, list[PathMeasures]] = {}
     for path in range(min(PATHS, study.runs)):
         number = 1000 * study.seed + path
         curve, network = s_path(number), network_of(number)
@@ -87,13 +89,13 @@ def work(study: Study, case: str) -> dict[str, tuple[SuccessResult, ...]]:
         ):
             driver = behind(control, CONTROLLERS[name](curve, setting), setting.middleware)
             track = run(curve, driver, delay, number, robot=robot, setting=setting)
-            found.setdefault(way, []).append(seen(track))
+            found.setdefault(way, []).append(measured(track))
     return {way: tuple(runs) for way, runs in found.items()}
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """What the middleware does for each of the controllers."""
-    found: dict[str, dict[str, tuple[SuccessResult, ...]]] = dict(zip(CASES, results, strict=True))
+    found: dict[str, dict[str, tuple[PathMeasures, ...]]] = dict(zip(CASES, results, strict=True))
     claims = tuple(wrapping_claim(case, runs, study.seed) for case, runs in found.items())
     rows: list[tuple[Cell, ...]] = []
     for case, runs in found.items():
@@ -104,11 +106,11 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (Table("wrapping", "Controllers behind the middleware", columns, tuple(rows)),))
 
 
-def _mean_error(runs: tuple[SuccessResult, ...]) -> float:
+def _mean_error(runs: tuple[PathMeasures, ...]) -> float:
     return 100 * float(np.mean([one.error for one in runs]))
 
 
-def wrapping_claim(case: str, runs: dict[str, tuple[SuccessResult, ...]], seed: int) -> Claim:
+def wrapping_claim(case: str, runs: dict[str, tuple[PathMeasures, ...]], seed: int) -> Claim:
     """The error with the middleware as a share of that without, for one robot and path."""
     robot, name = case.split("/")
     ratios = [behind.error / without.error for behind, without in zip(runs["with"], runs["without"], strict=True)]

@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.lab.claims import Study
 from interfaces.lab.tipsuwan import PAPER, extent, gain, success, wrapping
-from interfaces.lab.tipsuwan.predictive import PredictiveConfig
+from interfaces.lab.tipsuwan.predictive import PredictiveController
 from interfaces.lab.tipsuwan.run import (
     ARRIVAL,
     LIFTED,
@@ -20,6 +20,7 @@ from interfaces.lab.tipsuwan.run import (
     DriveTrace,
     NetworkControl,
     NetworkRunSetting,
+    PathMeasures,
     Reason,
     agent,
     leg,
@@ -30,7 +31,7 @@ from interfaces.lab.tipsuwan.run import (
     run,
     s_path,
 )
-from interfaces.lab.tipsuwan.success import CASES, PATHS, PathSuccess, SuccessResult, succeeds
+from interfaces.lab.tipsuwan.success import CASES, PATHS, PathSuccess, succeeds
 from interfaces.middleware import MiddlewareConfig
 from robots.onboard.curve import Curve
 from vrs.errors import InvalidValueError
@@ -49,7 +50,7 @@ def test_the_papers_three_cases(robot):
     ideal = driven(NetworkControl.DIRECT, no_delay(), robot=robot)
     without = driven(NetworkControl.DIRECT, network_of(1), robot=robot)
     behind = driven(NetworkControl.NETWORK, network_of(1), robot=robot)
-    assert succeeds(*map(success.seen, (ideal, without, behind)))
+    assert succeeds(*map(measured, (ideal, without, behind)))
     assert ideal.t[-1] < behind.t[-1] < without.t[-1] == pytest.approx(15.0)
     assert measured(without).reason is Reason.LIMIT_CYCLE
     assert 0.1 < measured(without).progress < 1.0
@@ -165,9 +166,9 @@ def test_errors_and_progress_are_measured():
 
 
 GOOD = {
-    "ideal": SuccessResult(True, 5.0, 0.01, 1.0, Reason.ARRIVED),
-    "without": SuccessResult(False, 15.0, 0.1, 0.8, Reason.LIMIT_CYCLE),
-    "behind": SuccessResult(True, 11.0, 0.02, 1.0, Reason.ARRIVED),
+    "ideal": PathMeasures(True, 5.0, 0.01, 1.0, Reason.ARRIVED),
+    "without": PathMeasures(False, 15.0, 0.1, 0.8, Reason.LIMIT_CYCLE),
+    "behind": PathMeasures(True, 11.0, 0.02, 1.0, Reason.ARRIVED),
 }
 
 
@@ -308,12 +309,12 @@ def test_a_letter_says_what_became_of_a_path(arrivals, error, letter, monkeypatc
     monkeypatch.setattr(extent, "run", lambda _, control, delay, *__, **___: (control, delay.name))
     monkeypatch.setattr(extent, "agent", lambda control, *_: control)
 
-    def seen(told):
+    def measures(told):
         control, delay = told
         arrived = ideal if delay == "none" else behind if control is NetworkControl.EXACT else without
-        return SuccessResult(arrived, 1.0, 0.1 if control is NetworkControl.DIRECT else error, 1.0, Reason.SLOW)
+        return PathMeasures(arrived, 1.0, 0.1 if control is NetworkControl.DIRECT else error, 1.0, Reason.SLOW)
 
-    monkeypatch.setattr(extent, "seen", seen)
+    monkeypatch.setattr(extent, "measured", measures)
     assert extent.outcome_letter(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
 
 
@@ -341,9 +342,7 @@ def test_the_paper_is_in_the_list():
     (lambda: NetworkRunSetting(period=0.0), "period must be"),
     (lambda: leg(0.01), "median must be"),
     (lambda: leg(0.2, -1.0), "correlation time must be"),
-    (lambda: PredictiveConfig(period=0.2), "period must be"),
-    (lambda: PredictiveConfig(horizon=0), "horizon must be"),
-    (lambda: PredictiveConfig(effort=(0.0, 0.1)), "effort must be"),
+    (lambda: PredictiveController(CURVE, SETTING.middleware.probing, lag=1.1), "lag must be"),
     (lambda: driven(NetworkControl.DIRECT, no_delay(), robot="r2d2"), "one of kinematic, ipr"),
 ])  # fmt: skip
 def test_impossible_settings_are_refused(make, said):
