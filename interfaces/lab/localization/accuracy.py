@@ -47,17 +47,6 @@ COLOURS = (VIRTUAL, "#7b4fa3", GOOD, MUTED, REAL, BAD)
 
 
 @dataclass(slots=True, eq=False)
-class DrawnInstant:
-    """An instant that is drawn."""
-
-    time: float
-    posture: tuple[float, float, float]
-    covariance: Array
-    points: Array
-    """What was seen, in the world frame as the estimate has it [m], (k, 2)."""
-
-
-@dataclass(slots=True, eq=False)
 class DrawnDrive:
     """A drive to be drawn."""
 
@@ -65,7 +54,8 @@ class DrawnDrive:
     plan: GspMap
     built: GspMap
     record: Record | None = None
-    looks: list[DrawnInstant] = field(default_factory=list)
+    looks: list[tuple[tuple[float, float, float], Array, Array]] = field(default_factory=list)
+    """Instants: the posture, its covariance, and what was seen, in the world as the estimate has it [m], (k, 2)."""
 
     def look(self, t: float, localizer: Localizer) -> None:
         """Note what a localizer says at a time [s], each so often."""
@@ -75,7 +65,7 @@ class DrawnDrive:
         x, y, theta = tracker.seen_from
         c, s = math.cos(theta), math.sin(theta)
         points = tracker.points.places @ np.array([[c, s], [-s, c]]) + (x, y)
-        self.looks.append(DrawnInstant(t, tracker.seen_from, np.array(tracker.covariance), points))
+        self.looks.append((tracker.seen_from, np.array(tracker.covariance), points))
 
 
 def scenes(given: Sequence[DrawnDrive]) -> list[Figure]:
@@ -103,13 +93,12 @@ def _map(canvas: Canvas, scene: DrawnDrive, record: Record) -> None:
     ax.grid(False)
     _lines(ax, scene.plan, INK, "floor-plan map", 2.4)
     _lines(ax, scene.built, GOOD, "map built from a drive", 1.2)
-    points = np.concatenate([look.points for look in scene.looks]) if scene.looks else np.zeros((0, 2))
+    points = np.concatenate([seen for _, _, seen in scene.looks]) if scene.looks else np.zeros((0, 2))
     ax.plot(points[:, 0], points[:, 1], ".", color=VIRTUAL, markersize=1.2, alpha=0.5, label="scans")
     ax.plot(record.truth[:, 0], record.truth[:, 1], color=REAL, linewidth=1.0, label="true way")
-    for k, look in enumerate(scene.looks):
-        ring = _ellipse(look)
+    for k, ((x, y, theta), covariance, _) in enumerate(scene.looks):
+        ring = _ellipse((x, y), covariance)
         ax.plot(ring[:, 0], ring[:, 1], color=BAD, linewidth=1.0, label="estimate, 95 %" if k == 0 else None)
-        x, y, theta = look.posture
         ax.plot([x, x + 0.25 * math.cos(theta)], [y, y + 0.25 * math.sin(theta)], color=BAD, linewidth=1.0)
     ax.set_aspect("equal")
     ax.set_xlabel("x [m]")
@@ -117,11 +106,11 @@ def _map(canvas: Canvas, scene: DrawnDrive, record: Record) -> None:
     canvas.legend(loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
-def _ellipse(look: DrawnInstant) -> Array:
-    values, vectors = np.linalg.eigh(look.covariance[:2, :2])
+def _ellipse(centre: tuple[float, float], covariance: Array) -> Array:
+    values, vectors = np.linalg.eigh(covariance[:2, :2])
     turn = np.linspace(0, math.tau, 49)
     ring = np.column_stack([np.cos(turn), np.sin(turn)]) * np.sqrt(np.maximum(values, 0.0)) * _TWO_SIGMA * SCALE
-    return np.asarray(ring @ vectors.T + look.posture[:2])
+    return np.asarray(ring @ vectors.T + centre)
 
 
 def _errors(canvas: Canvas, record: Record) -> None:

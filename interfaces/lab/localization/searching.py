@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -124,13 +125,8 @@ NOTICED, RECOVERED = 3.0, 40.0
 """It has to notice within [s]; and to be found again within [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """One start and what was said of it."""
-
-    room: str
-    answer: str
-    """`right`, `wrong`, `ambiguous` or `none`."""
+ANSWERS: Final = ("right", "wrong", "ambiguous", "none")
+"""What is said of a start."""
 
 
 @cache
@@ -149,22 +145,25 @@ def _mapped(room: Room) -> Room:
     return Room(room.name, room.length, room.width, room.start, room.known().blocks)
 
 
-def measure_starts(study: Study, case: str) -> tuple[Start, ...]:
-    """Starts in a distinctive apartment; the case is its number and how many."""
+def measure_starts(study: Study, case: str) -> tuple[str, Counter[str]]:
+    """A distinctive apartment's name, and how many starts in it got which of `ANSWERS`.
+
+    The case is its number and how many.
+    """
     number, count = map(int, case.split(":"))
     room = _distinctive(study.seed, number)
     places = Ways(room, CLEAR).places
     rng = np.random.default_rng([study.seed, number, 11])
-    made = []
+    answers: Counter[str] = Counter()
     for k in range(count):
         x, y = places[int(rng.integers(len(places)))].tolist()
-        made.append(
-            _start(room, number, (study.seed, number, 20 + k), (x, y, float(rng.uniform(-math.pi, math.pi))))
-        )
-    return tuple(made)
+        posture = x, y, float(rng.uniform(-math.pi, math.pi))
+        answers[_start(room, number, (study.seed, number, 20 + k), posture)] += 1
+    return room.name, answers
 
 
-def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float, float, float]) -> Start:
+def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float, float, float]) -> str:
+    """Turn on the spot at a posture until it's found; the answer."""
     chosen = setting(room, number, 0.03, seed)
     localizer = Localizer(plan_map(room))
     with body_of(chosen, posture) as body:
@@ -175,11 +174,11 @@ def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float,
             if localizer.status is Status.TRACKING:
                 break
             body.drive(0.0, TURN, round(CONTROL / body.reality.dt))
-        return Start(room.name, answer_of(localizer, body.truth))
+        return answer_of(localizer, body.truth)
 
 
 def answer_of(localizer: Localizer, truth: tuple[float, float, float]) -> str:
-    """What is to be thought of what a localizer says."""
+    """What is to be thought of what a localizer says: one of `ANSWERS`."""
     if localizer.posture is None or localizer.status is not Status.TRACKING:
         return "ambiguous" if localizer.status is Status.AMBIGUOUS else "none"
     x, y, theta = localizer.posture
@@ -187,22 +186,20 @@ def answer_of(localizer: Localizer, truth: tuple[float, float, float]) -> str:
     return "right" if near else "wrong"
 
 
-def conclude_starts(_study: Study, found: tuple[tuple[Start, ...], ...]) -> Findings:
+def conclude_starts(_study: Study, found: tuple[tuple[str, Counter[str]], ...]) -> Findings:
     """How many were found."""
-    starts = [start for group in found for start in group]
-    count = {
-        what: sum(start.answer == what for start in starts) for what in ("right", "wrong", "ambiguous", "none")
-    }
-    right, wrong = count["right"] / len(starts), count["wrong"] / len(starts)
+    count = sum((answers for _, answers in found), Counter[str]())
+    starts = count.total()
+    right, wrong = count["right"] / starts, count["wrong"] / starts
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (group[0].room, *(sum(start.answer == what for start in group) for what in count)) for group in found
+        (room, *(answers[what] for what in ANSWERS)) for room, answers in found
     )
     return Findings(
         (
-            Claim(f"of {len(starts)} starts found [%]", OWN_BAR, "≥ 95", 100 * right, right >= 0.95),
+            Claim(f"of {starts} starts found [%]", OWN_BAR, "≥ 95", 100 * right, right >= 0.95),
             Claim("wrong and confident [%]", OWN_BAR, "≤ 1", 100 * wrong, wrong <= 0.01),
         ),
-        (Table("starts", f"starts anywhere, {STARTS} an apartment at most", ("apartment", *count), rows),),
+        (Table("starts", f"starts anywhere, {STARTS} an apartment at most", ("apartment", *ANSWERS), rows),),
     )  # fmt: skip
 
 

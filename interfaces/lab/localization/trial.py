@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from robots.ipr.robot import BareBody
 from robots.onboard.driving import STAND, Drive
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserModel, LaserScan
+from robots.onboard.localization import PaperLocalizer
+from robots.onboard.localizer import Localizer
+from robots.onboard.map_building import MapBuilder
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array
 
@@ -126,20 +129,6 @@ NOISES = (0.01, 0.02)
 """Of the ranges, in turns [m]."""
 
 
-class PostureSource(Protocol):
-    """Whoever says where the robot is."""
-
-    @property
-    def posture(self) -> tuple[float, float, float] | None:
-        """(x, y, θ) [m, m, rad]."""
-
-    def move(self, time: float, reading: tuple[float, float, float]) -> None:
-        """Hear the odometry."""
-
-    def see(self, scan: LaserScan) -> bool:
-        """Take in a scan, unless it came before; the same one is given until there's another."""
-
-
 class Reckoning:
     """Dead reckoning alone."""
 
@@ -155,6 +144,10 @@ class Reckoning:
     def see(self, _scan: LaserScan) -> bool:
         """Take no notice of a scan."""
         return True
+
+
+PostureSource: TypeAlias = Localizer | PaperLocalizer | MapBuilder | Reckoning
+"""Whoever says where the robot is."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +24,6 @@ from interfaces.lab.localization.accuracy import (
 )
 from interfaces.lab.localization.searching import (
     Carried,
-    Start,
     Twofold,
     conclude_carried,
     conclude_starts,
@@ -107,8 +107,8 @@ def test_the_figures_are_in_the_units_that_the_claims_name() -> None:
     assert claims[f"{PLAN}: largest position error [cm]"] == pytest.approx(50.0, abs=1.0)
 
 
-def starts(**count: int) -> list[list[Start]]:
-    return [[Start("room", answer)] * many for answer, many in count.items()]
+def starts(**count: int) -> list[tuple[str, Counter[str]]]:
+    return [("room", Counter({answer: many})) for answer, many in count.items()]
 
 
 def test_claims_on_starts_fail_where_too_few_are_found_or_too_many_wrong() -> None:
