@@ -24,7 +24,7 @@ from interfaces.lab.claims import (
     Table,
 )
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, Shortest, setting
-from interfaces.lab.goals.trial import MeasuredTrip, seen_all, travel
+from interfaces.lab.goals.trial import Trip, seen_all, travel
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, to_json, write_files
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.bullet.rooms import Block, Column, Room
@@ -41,12 +41,12 @@ DRAWN = 4
 """Trips of each group that are drawn; those that went wrong first."""
 
 
-def maps(found: Sequence[MeasuredTrip]) -> list[Figure]:
+def maps(found: Sequence[Trip]) -> list[Figure]:
     """A picture of each group's trips."""
     figures = []
     for group in dict.fromkeys(one.group for one in found):
         those = [one for one in found if one.group == group]
-        those.sort(key=lambda one: one.trip.arrived and not one.trip.touched)
+        those.sort(key=lambda one: one.arrived and not one.touched)
         shown = those[:DRAWN]
         rows = math.ceil(len(shown) / 2)
         title = f"Trips: {group}"
@@ -54,7 +54,7 @@ def maps(found: Sequence[MeasuredTrip]) -> list[Figure]:
     return figures
 
 
-def _maps(canvas: Canvas, found: Sequence[MeasuredTrip]) -> None:
+def _maps(canvas: Canvas, found: Sequence[Trip]) -> None:
     axes = np.ravel(canvas.subplots(math.ceil(len(found) / 2), min(len(found), 2), squeeze=False))
     for ax, one in zip(axes, found, strict=False):
         draw_trip(ax, one)
@@ -64,17 +64,17 @@ def _maps(canvas: Canvas, found: Sequence[MeasuredTrip]) -> None:
     canvas.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
-def draw_trip(ax: Axes, one: MeasuredTrip) -> None:
+def draw_trip(ax: Axes, one: Trip) -> None:
     """Draw the room and the way that was driven in it."""
-    trip, goal = one.trip, one.setting.goal
+    goal = one.setting.goal
     draw_room(ax, one.setting.room)
-    ax.plot(trip.track[:, 0], trip.track[:, 1], color=REAL, linewidth=1.4, label="driven")
+    ax.plot(one.track[:, 0], one.track[:, 1], color=REAL, linewidth=1.4, label="driven")
     ax.plot(*one.setting.start[:2], "o", color=GOOD, markersize=4, label="start")
     ax.plot(goal.x, goal.y, "x", color=BAD, markersize=6, label="goal")
-    for touch in trip.touched:
-        x, y, _ = trip.track[min(round(touch.time / 0.05), len(trip.track) - 1)]
+    for touch in one.touched:
+        x, y, _ = one.track[min(round(touch.time / 0.05), len(one.track) - 1)]
         ax.plot(x, y, "*", color=BAD, markersize=8)
-    ax.set_title(f"{one.setting.room.name}: {trip.state}, {trip.way:.1f} m, {trip.time:.0f} s", fontsize=8.0)
+    ax.set_title(f"{one.setting.room.name}: {one.state}, {one.way:.1f} m, {one.time:.0f} s", fontsize=8.0)
 
 
 def draw_room(ax: Axes, room: Room) -> None:
@@ -128,7 +128,7 @@ def study_of(goals: int) -> Paper:
     )
 
 
-def measure(study: Study, case: str) -> MeasuredTrip:
+def measure(study: Study, case: str) -> Trip:
     """A trip; the case is its group and number."""
     group, number = case.split(":")
     chosen = setting(group, study.seed, int(number))
@@ -138,19 +138,19 @@ def measure(study: Study, case: str) -> MeasuredTrip:
     mapped, true = (
         Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
     )
-    return MeasuredTrip(group, chosen, travel(chosen), mapped, true)
+    return travel(group, chosen, mapped, true)
 
 
-def conclude_asked(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
+def conclude_asked(study: Study, found: tuple[Trip, ...]) -> Findings:
     """What the issue asks for, of the goals among furniture and doors."""
     _, touched = _count(found)
     known = _ratios(found)
     long = len(found) - sum(ratio <= LONGER for ratio in known)
     middle = bootstrap(known, study.seed, median) if known else Estimate(math.nan, math.nan, math.nan)
     blocked = [one for one in found if one.group == ROUND]
-    rerouted = sum(one.trip.arrived for one in blocked)
+    rerouted = sum(one.arrived for one in blocked)
     late = [one for one in found if one.group == LATE]
-    waited = sum(one.trip.arrived for one in late)
+    waited = sum(one.arrived for one in late)
     total = len(found)
     claims = (
         _reached(found, math.ceil(REACHED * total - 1e-9)),
@@ -175,9 +175,9 @@ def conclude_asked(study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     return Findings(claims, (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_shut(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
+def conclude_shut(_study: Study, found: tuple[Trip, ...]) -> Findings:
     """Where there's no way the robot says so."""
-    clear = sum(one.trip.state is JourneyState.FAILED and one.trip.problem is RouteProblem.NO_WAY for one in found)
+    clear = sum(one.state is JourneyState.FAILED and one.problem is RouteProblem.NO_WAY for one in found)
     total = len(found)
     claim = Claim(
         f"goals of {total} behind a closed door that were given up with the reason", OWN_BAR, f"{total}", clear,
@@ -186,13 +186,13 @@ def conclude_shut(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
     return Findings((claim,), (_each(found),), tuple(maps(found)))
 
 
-def conclude_people(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
+def conclude_people(_study: Study, found: tuple[Trip, ...]) -> Findings:
     """Among people who stop for nobody nothing is asked of touches: they run into robots that stand."""
     table = Table("with people", TITLES[PEOPLE], COLUMNS, (_row(PEOPLE, found),))
     return Findings((), (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_physics(_study: Study, found: tuple[MeasuredTrip, ...]) -> Findings:
+def conclude_physics(_study: Study, found: tuple[Trip, ...]) -> Findings:
     """The same with physics."""
     _, touched = _count(found)
     claims = (
@@ -209,33 +209,32 @@ COLUMNS: Final = (
 """Of the table of groups; medians unless they say otherwise."""
 
 
-def _reached(found: Sequence[MeasuredTrip], least: int, where: str = "") -> Claim:
+def _reached(found: Sequence[Trip], least: int, where: str = "") -> Claim:
     reached, _ = _count(found)
     what = f"goals of {len(found)}{where} reached within 5 cm and 2 deg"
     return Claim(what, OWN_BAR, f"≥ {least}", reached, reached >= least)
 
 
-def _count(found: Sequence[MeasuredTrip]) -> tuple[int, int]:
+def _count(found: Sequence[Trip]) -> tuple[int, int]:
     """Goals that were reached, and on whose way something was touched."""
-    return sum(one.trip.arrived for one in found), sum(bool(one.trip.touched) for one in found)
+    return sum(one.arrived for one in found), sum(bool(one.touched) for one in found)
 
 
-def _ratios(found: Sequence[MeasuredTrip]) -> list[float]:
+def _ratios(found: Sequence[Trip]) -> list[float]:
     """Of those routes whose length can be compared."""
     return [one.ratio for one in found if math.isfinite(one.ratio)]
 
 
-def _row(group: str, found: Sequence[MeasuredTrip]) -> tuple[Cell, ...]:
-    trips = [one.trip for one in found]
-    there = [trip for trip in trips if trip.arrived]
+def _row(group: str, found: Sequence[Trip]) -> tuple[Cell, ...]:
+    there = [one for one in found if one.arrived]
     ratios = _ratios(found)
-    ways = [one.trip.way / one.true for one in found if one.trip.arrived and math.isfinite(one.true)]
+    ways = [one.way / one.true for one in there if math.isfinite(one.true)]
     reached, touched = _count(found)
     return (
         TITLES[group], len(found), reached, touched, _median(ratios), max(ratios, default=math.nan), _median(ways),
-        float(np.mean([trip.routes for trip in trips])), _median([trip.time for trip in there]),
-        100 * _median([trip.off for trip in there]), math.degrees(_median([trip.turned for trip in there])),
-        100 * max(trip.lost for trip in trips),
+        float(np.mean([one.routes for one in found])), _median([one.time for one in there]),
+        100 * _median([one.off for one in there]), math.degrees(_median([one.turned for one in there])),
+        100 * max(one.lost for one in found),
     )  # fmt: skip
 
 
@@ -251,21 +250,21 @@ EACH: Final = (
 """Of the table of trips."""
 
 
-def _each(found: Sequence[MeasuredTrip]) -> Table:
+def _each(found: Sequence[Trip]) -> Table:
     group = "goals" if len({one.group for one in found}) > 1 else found[0].group
     rows = tuple(_trip(one) for one in found)
     title = "trip by trip" if group == "goals" else f"{TITLES[group]}: trip by trip"
     return Table(f"trips: {group}", title, EACH, rows)
 
 
-def _trip(one: MeasuredTrip) -> tuple[Cell, ...]:
-    trip, start, goal = one.trip, one.setting.start, one.setting.goal
-    lengths = (length if math.isfinite(length) else None for length in (trip.planned, one.mapped, one.true))
-    things = ", ".join(dict.fromkeys(touch.thing for touch in trip.touched))
+def _trip(one: Trip) -> tuple[Cell, ...]:
+    start, goal = one.setting.start, one.setting.goal
+    lengths = (length if math.isfinite(length) else None for length in (one.planned, one.mapped, one.true))
+    things = ", ".join(dict.fromkeys(touch.thing for touch in one.touched))
     return (
-        one.group, one.setting.room.name, trip.state.value, trip.reason, "yes" if trip.arrived else "no", things,
-        start[0], start[1], goal.x, goal.y, *lengths, trip.way, trip.routes, trip.time,
-        100 * trip.off, math.degrees(trip.turned), 100 * trip.lost,
+        one.group, one.setting.room.name, one.state.value, one.reason, "yes" if one.arrived else "no", things,
+        start[0], start[1], goal.x, goal.y, *lengths, one.way, one.routes, one.time,
+        100 * one.off, math.degrees(one.turned), 100 * one.lost,
     )  # fmt: skip
 
 

@@ -42,8 +42,14 @@ class TripSetting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trip:
-    """What came of it."""
+    """What came of it, and the yardsticks of its length."""
 
+    group: str
+    setting: TripSetting
+    mapped: float
+    """Length of the shortest way on the map [m]."""
+    true: float
+    """Of the shortest way as things stood at first [m]; infinite where there was none."""
     state: JourneyState
     reason: str
     way: float
@@ -72,23 +78,10 @@ class Trip:
         """Whether it's at the goal within 5 cm and 2 deg."""
         return self.state is JourneyState.ARRIVED and self.off <= 0.05 and self.turned <= math.radians(2.0)
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MeasuredTrip:
-    """A trip, and the yardsticks of its length."""
-
-    group: str
-    setting: TripSetting
-    trip: Trip
-    mapped: float
-    """Length of the shortest way on the map [m]."""
-    true: float
-    """Of the shortest way as things stood at first [m]; infinite where there was none."""
-
     @property
     def ratio(self) -> float:
         """Length of the route on the map, by the shortest; nan where either of them is unknown."""
-        return self.trip.planned / self.mapped if math.isfinite(self.mapped) else math.nan
+        return self.planned / self.mapped if math.isfinite(self.mapped) else math.nan
 
 
 def body_of(setting: TripSetting, reality: MobileReality | None = None) -> MobileRobot:
@@ -138,8 +131,15 @@ class TrialPilot:
         return self._before
 
 
-def travel(setting: TripSetting) -> Trip:
-    """Let a robot look about, tell it where to go, and drive until it's there or gives up."""
+def travel(group: str, setting: TripSetting, mapped: float, true: float) -> Trip:
+    """Let a robot look about, tell it where to go, and drive until it's there or gives up.
+
+    Args:
+        group: Of the trip.
+        setting: Who is to go where.
+        mapped: Length of the shortest way on the map [m].
+        true: Of the shortest way as things stood at first [m].
+    """
     with body_of(setting) as body:
         pilot = TrialPilot(body)
         while body.time < FIRST_LOOK - 1e-9:
@@ -153,6 +153,10 @@ def travel(setting: TripSetting) -> Trip:
         x, y, theta = body.truth
         track = np.array(pilot.track)
         return Trip(
+            group=group,
+            setting=setting,
+            mapped=mapped,
+            true=true,
             state=journey.state,
             reason=journey.reason,
             problem=journey.problem,

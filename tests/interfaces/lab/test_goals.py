@@ -20,7 +20,6 @@ from interfaces.lab.goals import study as goals_study
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, Shortest, setting
 from interfaces.lab.goals.study import (
     EACH,
-    MeasuredTrip,
     conclude_asked,
     conclude_physics,
     conclude_shut,
@@ -66,11 +65,11 @@ def test_settings_repeat_and_are_what_their_group_says() -> None:
 @pytest.mark.parametrize("group", [FURNITURE, PHYSICS])
 def test_a_goal_is_reached_and_nothing_is_touched(group: str) -> None:
     found = measure(Study(11), f"{group}:2")
-    assert found.trip.arrived, found.trip.reason
-    assert not found.trip.touched
+    assert found.arrived, found.reason
+    assert not found.touched
     assert 0.98 <= found.ratio <= 1.15
-    assert found.trip.lost < 0.06
-    assert np.hypot(*(found.trip.track[-1, :2] - (found.setting.goal.x, found.setting.goal.y))) == found.trip.off
+    assert found.lost < 0.06
+    assert np.hypot(*(found.track[-1, :2] - (found.setting.goal.x, found.setting.goal.y))) == found.off
 
 
 def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
@@ -94,13 +93,13 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
     assert claims[0]["measured"] == 2
 
 
-TRIP = Trip(JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), np.zeros((2, 3)))
+WHERE = TripSetting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
+ARRIVED = (JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), np.zeros((2, 3)))
 FAILED = {"state": JourneyState.FAILED, "problem": RouteProblem.NO_WAY}
 
 
-def found(group: str, *, mapped: float = 5.0, **changes: Any) -> MeasuredTrip:
-    where = TripSetting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
-    return MeasuredTrip(group, where, replace(TRIP, **changes), mapped, mapped)
+def found(group: str, *, mapped: float = 5.0, **changes: Any) -> Trip:
+    return replace(Trip(group, WHERE, mapped, mapped, *ARRIVED), **changes)
 
 
 @pytest.fixture(name="without_maps")
@@ -142,7 +141,7 @@ def test_routes_that_are_mostly_too_long_or_unknown_are_said_so() -> None:
 
 @pytest.mark.usefixtures("without_maps")
 def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
-    def holds(conclude: Callable[..., Findings], *trips: MeasuredTrip) -> list[bool]:
+    def holds(conclude: Callable[..., Findings], *trips: Trip) -> list[bool]:
         return [claim.holds for claim in conclude(Study(), trips).claims]
 
     shut = found(SHUT, **FAILED)
