@@ -22,7 +22,6 @@ from interfaces.middleware import (
     MiddlewareConfig,
     default_network,
 )
-from interfaces.runtime.laboratory import run_parts
 from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.robot import BareBody, MobileRobot
 from robots.onboard.curve import Curve
@@ -279,78 +278,47 @@ def run(
     """
     setting = NetworkRunSetting() if setting is None else setting
     body, steps = make_robot(robot, start, setting.period, seed)
+    there_rng, back_rng = np.random.default_rng([seed, 5]).spawn(2)
+    there: Channel[DriveSetpoint | Probe] = Channel(Conditions(delay=delay), there_rng)
+    back: Channel[DriveFeedback | Echo] = Channel(Conditions(delay=delay), back_rng)
+    robot_end = ActionAgent()
+
+    def exchange(until: float) -> None:
+        """Let everything happen by then [s] on the network and at its other end, in the order of its times."""
+        while (now := earliest(there.next_deadline(), back.next_deadline(), driver.next_deadline())) is not None:
+            if now > until:
+                return
+            for sent in there.receive(now):
+                echo = robot_end.receive(sent.payload, now=now)
+                if echo is not None:
+                    back.send(echo, now, _ECHO)
+            for told in back.receive(now):
+                command = driver.receive(told.payload, now=now)
+                if command is not None:
+                    there.send(command, now, command.size)
+            probe = driver.to_send(now=now)
+            if probe is not None:
+                there.send(probe, now, _PROBE)
+
+    end, arrived = curve.at(curve.length), False
+    rows: list[tuple[float, ...]] = []
     with body:
-        return _NetworkRun(curve, driver, delay, np.random.default_rng([seed, 5]), body, steps, setting).whole()
-
-
-class _NetworkRun:
-    """A run while it goes on: deliveries, probes and sampling times in the order of their times."""
-
-    def __init__(
-        self,
-        curve: Curve,
-        driver: Agent,
-        delay: DelayProfile,
-        rng: np.random.Generator,
-        body: MobileRobot,
-        steps: int,
-        setting: NetworkRunSetting,
-    ) -> None:
-        self._curve, self._driver = curve, driver
-        there, back = rng.spawn(2)
-        self._there: Channel[DriveSetpoint | Probe] = Channel(Conditions(delay=delay), there)
-        self._back: Channel[DriveFeedback | Echo] = Channel(Conditions(delay=delay), back)
-        self._body, self._steps = body, steps
-        self._limits = body.limits
-        self._setting = setting
-        self._robot = ActionAgent()
-        self._end = curve.at(curve.length)
-        self._now = 0.0
-
-    def whole(self) -> DriveTrace:
-        period = self._setting.period
-        rows: list[tuple[float, ...]] = []
-        arrived = False
-        for k in range(round(self._setting.length / period) + 1):
-            now = k * period
-            self._until(now)
-            x, y, theta = self._body.truth
-            report = self._robot.sample(Posture(x, y, theta), now=now)
-            self._back.send(report, now, report.size)
+        for k in range(round(setting.length / setting.period) + 1):
+            now = k * setting.period
+            exchange(now)
+            x, y, theta = body.truth
+            report = robot_end.sample(Posture(x, y, theta), now=now)
+            back.send(report, now, report.size)
             # Without delay the command of this very report holds at once.
-            self._until(now)
-            drive = self._robot.driving(now=now)
+            exchange(now)
+            drive = robot_end.driving(now=now)
             rows.append((now, x, y, theta, *drive))
-            arrived = math.hypot(self._end.x - x, self._end.y - y) <= ARRIVAL
+            arrived = math.hypot(end.x - x, end.y - y) <= ARRIVAL
             if arrived:
                 break
-            v, w = clipped(drive.v, self._limits.v_max), clipped(drive.w, self._limits.w_max)
-            self._body.drive(v, w, self._steps)
-        made = np.array(rows)
-        return DriveTrace(self._curve, made[:, 0], made[:, 1:4], made[:, 4:6], arrived)
-
-    def _until(self, now: float) -> None:
-        """Let everything happen that happens on the network and at its other end by now [s]."""
-        self._now = run_parts([self], now=self._now, until=now)
-
-    def next_deadline(self) -> float | None:
-        """When something happens next [s]."""
-        return earliest(self._there.next_deadline(), self._back.next_deadline(), self._driver.next_deadline())
-
-    def advance(self, *, now: float) -> None:
-        """Let everything happen that happens at now [s]."""
-        driver, there, back, robot = self._driver, self._there, self._back, self._robot
-        for sent in there.receive(now):
-            echo = robot.receive(sent.payload, now=now)
-            if echo is not None:
-                back.send(echo, now, _ECHO)
-        for told in back.receive(now):
-            command = driver.receive(told.payload, now=now)
-            if command is not None:
-                there.send(command, now, command.size)
-        probe = driver.to_send(now=now)
-        if probe is not None:
-            there.send(probe, now, _PROBE)
+            body.drive(clipped(drive.v, body.limits.v_max), clipped(drive.w, body.limits.w_max), steps)
+    made = np.array(rows)
+    return DriveTrace(curve, made[:, 0], made[:, 1:4], made[:, 4:6], arrived)
 
 
 EVERY: Final = 0.05
