@@ -16,6 +16,7 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
+from interfaces.messages.drive_sites import ArcPacket
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Row, Witness, row_of
 from interfaces.teleop.architectures import (
     ArchitectureOperatorSite,
@@ -36,7 +37,6 @@ from robots.ipr.chassis import Senses
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
-from vrs.model import Array
 
 AFTER = 5.0
 """A run goes on for the largest delay and this after the operator stopped [s]."""
@@ -83,118 +83,97 @@ def run(case: DriveCase, driver: Operator | None = None, witness: Witness | None
         np.random.default_rng([case.seed, 2]),
     )
     with make_robot(case, driver.start, case.room or driver.room) as body:
-        return _DrivingRun(case, driver, link, body, witness).whole()
+        return _driven(case, driver, link, body, witness)
 
 
-class _DrivingRun:
-    """A run while it goes on."""
-
-    def __init__(
-        self, case: DriveCase, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
-    ) -> None:
-        self._case, self._driver, self._link, self._body = case, driver, link, body
-        model = replace(case.real[0].base, period=case.constants.period)
-        made = controller(case.architecture, driver.start, case.constants)
-        senses = case.architecture in SENSING
-        there = operator_surroundings(body.room, driver.start, model) if senses else None
-        here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
-        self._site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)
-        position = POSITIONS[case.position](body)
-        self._robot = ArchitectureRobotSite(made, position, body.limits, period=CONTROL, surroundings=here)
-        self._offset = made if isinstance(made, TimelineController) else None
-        self._waiting = 0
-        """Packets on their way that were sent while the operator drove."""
-        self._delays: list[tuple[float, float]] = []
-        self._largest = 0.0
-        self._estimate: list[float] = []
-        self._bytes = self._reported = 0
-        self._learned: list[tuple[float, tuple[tuple[int, int], ...]]] = []
-        self._witness = witness
-        if witness is not None:
-            witness.begun(case, driver.start, body, self._site, link)
-
-    def whole(self) -> DriveRun:
-        """From the start until the real robot could have done all."""
-        case = self._case
-        every = round(case.constants.period / CONTROL)
-        driving = every * round(case.length / case.constants.period)
-        end, last = driving, driving + round(LONGEST_WAIT / CONTROL)
-        rows: list[tuple[float, ...]] = []
-        k = 0
-        while k <= end:
-            rows.append(self._step(k, send=k % every == 0, driving=k < driving))
-            k += 1
-            if k > driving:
-                end = min(last, k if self._waiting else driving + math.ceil((self._largest + AFTER) / CONTROL))
-        return self._made(np.array(rows))
-
-    def _step(self, k: int, *, send: bool, driving: bool) -> tuple[float, ...]:
-        """One control period from k on; returns what was so at its start."""
-        now, link, robot, body = k * CONTROL, self._link, self._robot, self._body
-        if send:
-            self._send(now, driving=driving)
+def _driven(
+    case: DriveCase, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
+) -> DriveRun:
+    """Drive from the start until the real robot could have done all."""
+    model = replace(case.real[0].base, period=case.constants.period)
+    made = controller(case.architecture, driver.start, case.constants)
+    senses = case.architecture in SENSING
+    there = operator_surroundings(body.room, driver.start, model) if senses else None
+    here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
+    site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)
+    position = POSITIONS[case.position](body)
+    robot = ArchitectureRobotSite(made, position, body.limits, period=CONTROL, surroundings=here)
+    if witness is not None:
+        witness.begun(case, driver.start, body, site, link)
+    steps = round(CONTROL / body.reality.dt)
+    every = round(case.constants.period / CONTROL)
+    driving = every * round(case.length / case.constants.period)
+    end, last = driving, driving + round(LONGEST_WAIT / CONTROL)
+    # Packets on their way that were sent while the operator drove.
+    waiting = 0
+    largest, delays = 0.0, list[tuple[float, float]]()
+    sent_bytes = reported_bytes = 0
+    learned: list[tuple[float, tuple[tuple[int, int], ...]]] = []
+    estimate: list[float] = []
+    rows: list[tuple[float, ...]] = []
+    k = 0
+    while k <= end:
+        now, send = k * CONTROL, k % every == 0
+        packet = _packet(case, driver, site, now, driving=k < driving) if send else None
+        if packet is not None:
+            sent_bytes += packet.size
+            if witness is not None:
+                witness.sent("forward", now, packet.size)
+            arrival = link.forward.send(packet, now, packet.size)
+            # A stream's packet arrives in the end; a datagram that gets no time of arrival is lost.
+            waiting += k < driving and (arrival is not None or case.transport is not Transport.DATAGRAMS)
         for arrived in link.forward.receive(now):
-            if arrived.sent < self._case.length:
-                self._waiting -= 1
-                self._delays.append((arrived.sent, arrived.arrived - arrived.sent))
-                self._largest = max(self._largest, arrived.arrived - arrived.sent)
+            if arrived.sent < case.length:
+                waiting -= 1
+                delays.append((arrived.sent, arrived.arrived - arrived.sent))
+                largest = max(largest, arrived.arrived - arrived.sent)
             robot.receive(arrived.payload, now=now)
         for answer in link.backward.receive(now):
-            self._site.receive(answer.payload, now=now)
-        around = self._site.surroundings
-        if around is not None and k % _LEARNED == 0:
-            self._learned.append((now, around.environment.obstacles(now)))
+            site.receive(answer.payload, now=now)
+        if there is not None and k % _LEARNED == 0:
+            learned.append((now, there.environment.obstacles(now)))
         drive = robot.drive(now=now)
         if send:
             report = robot.report(now=now)
-            self._reported += report.size
-            self._note("backward", now, report.size)
+            reported_bytes += report.size
+            if witness is not None:
+                witness.sent("backward", now, report.size)
             link.backward.send(report, now, report.size)
-            self._estimate = self._site.estimator.posture.tolist()
-        D = None if self._offset is None else self._offset.D
-        row = (now, *body.truth, *robot.posture, *drive, math.nan if D is None else D)
-        body.drive(drive.v, drive.w, round(CONTROL / body.reality.dt))
-        return (*row, *self._estimate)
+            estimate = site.estimator.posture.tolist()
+        D = made.D if isinstance(made, TimelineController) else None
+        rows.append((now, *body.truth, *robot.posture, *drive, math.nan if D is None else D, *estimate))
+        body.drive(drive.v, drive.w, steps)
+        k += 1
+        if k > driving:
+            end = min(last, k if waiting else driving + math.ceil((largest + AFTER) / CONTROL))
+    table = np.array(rows)
+    return DriveRun(
+        case=case,
+        t=table[:, 0],
+        virtual=site.engine.posture(table[:, 0]),
+        real=table[:, 1:4],
+        measured=table[:, 4:7],
+        drives=table[:, 7:9],
+        offset=table[:, 9],
+        estimated=table[:, 10:13],
+        delays=np.array(delays).reshape(-1, 2),
+        touched=body.collisions,
+        sent_bytes=sent_bytes,
+        reported_bytes=reported_bytes,
+        learned=tuple(learned),
+    )
 
-    def _send(self, now: float, *, driving: bool) -> None:
-        """What the operator's site sends in this period, if anything."""
-        site, datagrams = self._site, self._case.transport is Transport.DATAGRAMS
-        if driving:
-            wanted = self._driver.drive(now, site.posture, site.before)
-            if now >= self._case.length - STOPPING:
-                wanted = STAND
-            packet = site.drive(wanted.v, wanted.w, now=now)
-        elif datagrams:
-            packet = site.repeat()
-        else:
-            return
-        self._bytes += packet.size
-        self._note("forward", now, packet.size)
-        arrival = self._link.forward.send(packet, now, packet.size)
-        # A stream's packet arrives in the end; a datagram that gets no time of arrival is lost.
-        self._waiting += driving and (arrival is not None or not datagrams)
 
-    def _note(self, direction: str, now: float, size: int) -> None:
-        if self._witness is not None:
-            self._witness.sent(direction, now, size)
-
-    def _made(self, rows: Array) -> DriveRun:
-        t = rows[:, 0]
-        return DriveRun(
-            case=self._case,
-            t=t,
-            virtual=self._site.engine.posture(t),
-            real=rows[:, 1:4],
-            measured=rows[:, 4:7],
-            drives=rows[:, 7:9],
-            offset=rows[:, 9],
-            estimated=rows[:, 10:13],
-            delays=np.array(self._delays).reshape(-1, 2),
-            touched=self._body.collisions,
-            sent_bytes=self._bytes,
-            reported_bytes=self._reported,
-            learned=tuple(self._learned),
-        )
+def _packet(
+    case: DriveCase, driver: Operator, site: ArchitectureOperatorSite, now: float, *, driving: bool
+) -> ArcPacket | None:
+    """What the operator's site sends in this period, if anything."""
+    if driving:
+        wanted = driver.drive(now, site.posture, site.before)
+        if now >= case.length - STOPPING:
+            wanted = STAND
+        return site.drive(wanted.v, wanted.w, now=now)
+    return site.repeat() if case.transport is Transport.DATAGRAMS else None
 
 
 FOLDER: Final = "runs"
