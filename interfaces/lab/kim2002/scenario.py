@@ -7,15 +7,15 @@ and the list of jobs are those that run live. The book is a body of its own in P
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Request, Show, SilentSpeaker
+from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Show, SilentSpeaker
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
@@ -48,16 +48,6 @@ LONGEST = 150.0
 """A run that isn't over by then has failed [s]."""
 _MEETS = 10.5
 """So long after the key the robot comes by where somebody crosses its way [s], but for how he's drawn."""
-
-
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """What is run."""
-
-    seed: int = 0
-    """Of the robot's noise and slip, and of when and how fast somebody walks by."""
-    book: Cargo = field(default_factory=Cargo)
-    """What is put on top."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,119 +112,101 @@ def home(rng: np.random.Generator) -> Room:
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 
-def play(scenario: Scenario) -> ScenarioResult:
-    """Run the scenario in PyBullet, in virtual time."""
+def play(seed: int) -> ScenarioResult:
+    """Run the scenario in PyBullet, in virtual time.
+
+    Args:
+        seed: Of the robot's noise and slip, and of when and how fast somebody walks by.
+    """
     from robots.ipr.body import MobileBody
 
-    rng = np.random.default_rng([scenario.seed, 1])
-    room = home(rng)
+    room = home(np.random.default_rng([seed, 1]))
     senses = Senses(camera=None, laser=LaserModel())
-    with MobileBody("ipr", room=room, rng=np.random.default_rng([scenario.seed, 2]), senses=senses) as body:
-        return ScenarioRun(scenario, room, body).whole()
+    with MobileBody("ipr", room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
+        return _played(room, body)
 
 
-class ScenarioRun:
-    """A run while it goes on."""
-
-    def __init__(self, scenario: Scenario, room: Room, body: MobileBody) -> None:
-        self._scenario, self._room, self._body = scenario, room, body
-        self._pilot = TrialPilot(body)
-        self._places = {one.name: Goal(one.x, one.y, one.heading) for one in room.places}
-        self._runner = JobRunner()
-        self._runner.load(JobList(JOBS, self._places), now=0.0)
-        self._speaker = SilentSpeaker()
-        self._moving = self._speaking = 0
-        """Numbers of the attempts that are carried out; 0 for none."""
-        self._asked: list[str] = []
-        self._shown = self._shown_at_key = ""
-        self._stops: list[ScenarioStop] = []
-        self._put: tuple[float, float, float] | None = None
-        self._passed = math.inf
-
-    def whole(self) -> ScenarioResult:
-        """Drive until it's done, or has taken too long."""
-        body, pilot, runner = self._body, self._pilot, self._runner
-        begun = brought = pressed = False
-        while body.time < LONGEST:
-            now = body.time
-            if not begun and now >= FIRST_LOOK - 1e-9:
-                begun = not runner.receive(ListCommand.RUN, now=now)
-            if not brought and now >= BROUGHT and runner.waits_for_key:
-                body.load(self._scenario.book)
-                brought = True
-            if not pressed and brought and now >= KEY:
-                self._put, self._shown_at_key = body.cargo[0], self._shown
-                pressed = not runner.receive(ListCommand.KEY, now=now)
-            self._answer(now)
-            for request in runner.advance(now=now):
-                self._carry_out(request, now)
-            if begun and not runner.running:
-                break
-            pilot.step()
-            if pressed:
-                self._passed = min(self._passed, self.gap())
-        return self._made()
-
-    def _answer(self, now: float) -> None:
-        """Tell the list what has been carried out."""
-        journey = self._pilot.journey
-        if self._moving and journey.state not in GOING:
-            attempt, self._moving = self._moving, 0
+def _played(room: Room, body: MobileBody) -> ScenarioResult:
+    """Drive until the list is done, or has taken too long."""
+    pilot, runner, speaker = TrialPilot(body), JobRunner(), SilentSpeaker()
+    places = {one.name: Goal(one.x, one.y, one.heading) for one in room.places}
+    runner.load(JobList(JOBS, places), now=0.0)
+    # Attempts that are carried out; 0 for none.
+    moving = speaking = 0
+    begun = brought = pressed = False
+    asked: list[str] = []
+    stops: list[ScenarioStop] = []
+    shown = shown_at_key = ""
+    put: tuple[float, float, float] | None = None
+    passed = math.inf
+    while (now := body.time) < LONGEST:
+        if not begun and now >= FIRST_LOOK - 1e-9:
+            begun = not runner.receive(ListCommand.RUN, now=now)
+        if not brought and now >= BROUGHT and runner.waits_for_key:
+            body.load(Cargo())
+            brought = True
+        if not pressed and brought and now >= KEY:
+            put, shown_at_key = body.cargo[0], shown
+            pressed = not runner.receive(ListCommand.KEY, now=now)
+        journey = pilot.journey
+        if moving and journey.state not in GOING:
+            attempt, moving = moving, 0
+            stops.append(_stop(journey.goal, body.truth, pilot.posture))
             arrived = journey.state is JourneyState.ARRIVED
-            self._stops.append(self._stop(journey.goal))
-            self._runner.receive(Done(attempt) if arrived else JobFailed(attempt, journey.reason), now=now)
-        if self._speaking and not self._speaker.is_speaking(now=now):
-            attempt, self._speaking = self._speaking, 0
-            self._runner.receive(Done(attempt), now=now)
+            runner.receive(Done(attempt) if arrived else JobFailed(attempt, journey.reason), now=now)
+        if speaking and not speaker.is_speaking(now=now):
+            attempt, speaking = speaking, 0
+            runner.receive(Done(attempt), now=now)
+        for request in runner.advance(now=now):
+            match request:
+                case CarryOut(attempt, MoveJob(to=Goal() as goal)):
+                    moving = attempt
+                    asked.append(f"MOVE {next(name for name, one in places.items() if one == goal)}")
+                    pilot.go(goal)
+                case CarryOut(attempt, VoiceJob(text=text)):
+                    speaking = attempt
+                    asked.append(f"VOICE {text}")
+                    speaker.speak(text, now=now)
+                case Show(shown):
+                    asked.append(f"MESSAGE {shown}")
+                case EndJob():
+                    journey.end()
+                    moving = speaking = 0
+                case CarryOut(attempt):
+                    runner.receive(JobFailed(attempt, "there's no arm"), now=now)
+        if begun and not runner.running:
+            break
+        pilot.step()
+        if pressed:
+            passed = min(passed, gap(body, room.people[1]))
+    lies = body.cargo[0] if body.cargo else None
+    on_top = lies is not None and lies[2] > IPR.height and max(abs(lies[0] - IPR.centre_x), abs(lies[1])) < 0.2
+    slid = math.inf if lies is None or put is None else math.dist(lies[:2], put[:2])
+    return ScenarioResult(
+        stage=runner.progress.stage, reason=runner.progress.reason, asked=tuple(asked), shown=shown_at_key,
+        stops=tuple(stops), book=lies, slid=slid, on_top=on_top, touched=body.collisions,
+        passed=passed, lost=pilot.lost, time=body.time, track=np.array(pilot.track),
+    )  # fmt: skip
 
-    def _carry_out(self, request: Request, now: float) -> None:
-        match request:
-            case CarryOut(attempt, MoveJob(to=Goal() as goal)):
-                name = next(name for name, one in self._places.items() if one == goal)
-                self._asked.append(f"MOVE {name}")
-                self._moving = attempt
-                self._pilot.go(goal)
-            case CarryOut(attempt, VoiceJob(text=text)):
-                self._asked.append(f"VOICE {text}")
-                self._speaking = attempt
-                self._speaker.speak(text, now=now)
-            case Show(text):
-                self._asked.append(f"MESSAGE {text}")
-                self._shown = text
-            case EndJob():
-                self._pilot.journey.end()
-                self._moving = self._speaking = 0
-            case CarryOut(attempt):
-                self._runner.receive(JobFailed(attempt, "there's no arm"), now=now)
 
-    def _stop(self, goal: Goal | None) -> ScenarioStop:
-        assert goal is not None
-        assert goal.heading is not None
-        x, y, theta = self._body.truth
-        told = self._pilot.posture
-        return ScenarioStop(
-            math.hypot(goal.x - x, goal.y - y), abs(wrapped(goal.heading - theta)),
-            math.hypot(told.x - x, told.y - y),
-        )  # fmt: skip
+def _stop(goal: Goal | None, truth: tuple[float, float, float], told: tuple[float, float, float]) -> ScenarioStop:
+    """How far the robot came from a goal, and how wrong it was about that."""
+    assert goal is not None
+    assert goal.heading is not None
+    x, y, theta = truth
+    return ScenarioStop(
+        math.hypot(goal.x - x, goal.y - y), abs(wrapped(goal.heading - theta)),
+        math.hypot(told[0] - x, told[1] - y),
+    )  # fmt: skip
 
-    def gap(self) -> float:
-        """From the robot's outline to who walks by, now [m]."""
-        x, y, theta = self._body.truth
-        walker = self._room.people[1]
-        dx, dy = (a - b for a, b in zip(walker.at(self._body.time), (x, y), strict=True))
-        c, s = math.cos(theta), math.sin(theta)
-        along, across = abs(c * dx + s * dy - IPR.centre_x), abs(c * dy - s * dx)
-        return math.hypot(max(along - IPR.length / 2, 0.0), max(across - IPR.width / 2, 0.0)) - walker.radius
 
-    def _made(self) -> ScenarioResult:
-        progress, book = self._runner.progress, self._body.cargo[0] if self._body.cargo else None
-        on_top = book is not None and book[2] > IPR.height and max(abs(book[0] - IPR.centre_x), abs(book[1])) < 0.2
-        slid = math.inf if book is None or self._put is None else math.dist(book[:2], self._put[:2])
-        return ScenarioResult(
-            stage=progress.stage, reason=progress.reason, asked=tuple(self._asked), shown=self._shown_at_key,
-            stops=tuple(self._stops), book=book, slid=slid, on_top=on_top, touched=self._body.collisions,
-            passed=self._passed, lost=self._pilot.lost, time=self._body.time, track=np.array(self._pilot.track),
-        )  # fmt: skip
+def gap(body: MobileBody, walker: Person) -> float:
+    """From the robot's outline to somebody, now [m]."""
+    x, y, theta = body.truth
+    dx, dy = (a - b for a, b in zip(walker.at(body.time), (x, y), strict=True))
+    c, s = math.cos(theta), math.sin(theta)
+    along, across = abs(c * dx + s * dy - IPR.centre_x), abs(c * dy - s * dx)
+    return math.hypot(max(along - IPR.length / 2, 0.0), max(across - IPR.width / 2, 0.0)) - walker.radius
 
 
 SECTION: Final = "section 5"
@@ -253,14 +225,14 @@ TOGETHER: Final = 5
 def measure(study: Study, case: str) -> tuple[ScenarioResult, ...]:
     """Each `TOGETHER`-th run from the case's number on."""
     numbers = range(int(case), study.runs, TOGETHER)
-    return tuple(play(Scenario(int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0]))) for k in numbers)
+    return tuple(play(int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0])) for k in numbers)
 
 
 def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> Findings:
     """What the paper says of its scenario."""
     found = [measured[k % TOGETHER][k // TOGETHER] for k in range(study.runs)]
     total = len(found)
-    count = partial(_count, total)
+    count, at_stops = partial(_count, total), partial(_at_stops, study, found)
     touches = sum(len(one.touched) for one in found)
     claims = (
         count("runs of {} in which the list was done to its end", [one.stage is JobStage.DONE for one in found]),
@@ -269,9 +241,9 @@ def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> 
         count("runs of {} in which the book arrived on top at A", [one.on_top and _at_a(one) for one in found]),
         count("runs of {} in which somebody passed near the robot", [one.passed < _BY for one in found]),
         Claim("touches: who passes is avoided", SECTION, "0", touches, touches == 0),
-        *(_posture(study, name, k, found) for k, name in enumerate("BA")),
-        *(_turn(study, name, k, found) for k, name in enumerate("BA")),
-        *(_known(study, name, k, found) for k, name in enumerate("BA")),
+        *at_stops("position error at {} [cm]", 100 * NEAR, lambda stop: 100 * stop.off),
+        *at_stops("heading error at {} [deg]", NEAR_TURN, lambda stop: math.degrees(stop.turned)),
+        *at_stops("error of the localization at {} [cm]", 100 * KNOWN, lambda stop: 100 * stop.lost),
     )
     return Findings(claims, (_table(found),), (picture(found[0]),))
 
@@ -284,19 +256,13 @@ def _at_a(one: ScenarioResult) -> bool:
     return len(one.stops) == len([job for job in JOBS if isinstance(job, MoveJob)]) and one.stops[-1].off <= NEAR
 
 
-def _posture(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
-    errors = [100 * one.stops[k].off if len(one.stops) > k else math.inf for one in found]
-    return _bounded(f"position error at {name} [cm]: mean", 100 * NEAR, errors, study)
-
-
-def _turn(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
-    errors = [math.degrees(one.stops[k].turned) if len(one.stops) > k else math.inf for one in found]
-    return _bounded(f"heading error at {name} [deg]: mean", NEAR_TURN, errors, study)
-
-
-def _known(study: Study, name: str, k: int, found: Sequence[ScenarioResult]) -> Claim:
-    errors = [100 * one.stops[k].lost if len(one.stops) > k else math.inf for one in found]
-    return _bounded(f"error of the localization at {name} [cm]: mean", 100 * KNOWN, errors, study)
+def _at_stops(
+    study: Study, found: Sequence[ScenarioResult], what: str, bar: float, error: Callable[[ScenarioStop], float]
+) -> Iterator[Claim]:
+    """An error at B and at A; infinite where the robot never came."""
+    for k, name in enumerate("BA"):
+        errors = [error(one.stops[k]) if len(one.stops) > k else math.inf for one in found]
+        yield _bounded(f"{what.format(name)}: mean", bar, errors, study)
 
 
 def _bounded(what: str, bar: float, values: Sequence[float], study: Study) -> Claim:

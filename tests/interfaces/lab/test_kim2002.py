@@ -16,11 +16,10 @@ from interfaces.lab.kim2002 import PAPER, scenario
 from interfaces.lab.kim2002.scenario import (
     ORDER,
     PLEASE,
-    Scenario,
     ScenarioResult,
-    ScenarioRun,
     ScenarioStop,
     conclude,
+    gap,
     play,
 )
 from interfaces.lab.papers import papers
@@ -33,7 +32,7 @@ from vrs.errors import InvalidValueError
 
 
 def test_the_scenario_is_played_to_its_end() -> None:
-    found = play(Scenario(3))
+    found = play(3)
     assert (found.stage, found.reason) == (JobStage.DONE, "")
     assert found.asked == ORDER
     assert found.shown == PLEASE
@@ -114,11 +113,10 @@ def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
 
 def test_a_gap_is_from_outline_to_outline() -> None:
     walker = Person("passer-by", 0.22, 1.7, (0.0, 1.0), (2.0, 2.0), (0.1, 0.1))
-    body = SimpleNamespace(truth=(0.0, 0.0, 0.0), time=0.0)
-    run: Any = SimpleNamespace(_body=body, _room=SimpleNamespace(people=(None, walker)))
-    assert ScenarioRun.gap(run) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
+    body: Any = SimpleNamespace(truth=(0.0, 0.0, 0.0), time=0.0)
+    assert gap(body, walker) == pytest.approx(2.0 - (IPR.centre_x + IPR.length / 2) - 0.22)
     body.truth = (2.0, -0.9, math.pi)
-    assert ScenarioRun.gap(run) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
+    assert gap(body, walker) == pytest.approx(1.0 - IPR.width / 2 - 0.22)
 
 
 def test_the_paper_is_known_by_its_name() -> None:
