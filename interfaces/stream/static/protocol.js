@@ -388,7 +388,7 @@ function map(x, where) {
  * @property {boolean} [fatal] boolean (false). Whether the connection ends.
  */
 /**
- * Joint limits, each of shape (n,).
+ * Joint limits, each of shape (n,); of prismatic joints in m for rad.
  * @typedef {object} Limits
  * @property {Array<number>} q_min joints. Lowest position [rad].
  * @property {Array<number>} q_max joints. Highest position [rad], above q_min.
