@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from interfaces import connect_mobile
-from interfaces.jobs import JobFile
+from interfaces.jobs import JobFile, RunnerConfig
 from interfaces.link import LinkConditions
 from interfaces.messages.control import Lease, Problem, Role
 from interfaces.messages.drive_sites import Doing
@@ -36,6 +36,8 @@ from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.connection import MobileConnection
 from interfaces.stream.server import application
+from interfaces.teleop.architectures.compositions import CONTROL
+from interfaces.teleop.driving import DrivenConfig
 from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
@@ -64,7 +66,17 @@ async def listening(robot: LiveRobot) -> AsyncIterator[str]:
 @asynccontextmanager
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
-from robots import load
+    config = PacedConfig(ROBOT, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    async with listening(LiveRobot(PacedBody(config), Access(free={Role.SITE}))) as url:
+        at = sockets.bind("127.0.0.1", 0)
+        own = at.getsockname()[1]
+        operator = LiveMobileOperator(
+            LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions(), jobs=JobFile(jobs)),
+            Access(free=OPEN),
+        )
+        app = application(operator.routes, hosts(["127.0.0.1"], own))
+        async with sockets.serve(app, at), operator.running():
+            yield Serving(own)
 
 
 def met(url: str, name: str) -> MobileConnection:
