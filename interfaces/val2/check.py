@@ -14,7 +14,7 @@ from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import kind_of
 from interfaces.val2.functions import row_of
 from interfaces.val2.grammar import SIGNIFICANT
-from interfaces.val2.instructions import stands_for_frame
+from interfaces.val2.instructions import STATEMENTS, stands_for_frame
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
@@ -27,10 +27,8 @@ from interfaces.val2.syntax import (
     Compound,
     Expression,
     Format,
-    Ignored,
     Instruction,
     Program,
-    Statement,
     Step,
     Text,
     Variable,
@@ -157,8 +155,8 @@ class _Checker:
         self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         statement, read = step.statement, reads(step.statement)
-        if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
-            detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
+        if statement.passed is not None and statement.keyword not in forms.UNAVAILABLE:
+            detail = f"{statement.keyword} {statement.passed}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
         errors = [*self._calls(statement), *_set_parameter(statement)]
@@ -192,7 +190,7 @@ class _Checker:
         for child, kind in wanted(expression):
             yield from () if kind == "name" else self._unset(child, kind, usable, reported)
 
-    def _calls(self, statement: Statement) -> Iterator[ValError]:
+    def _calls(self, statement: Instruction) -> Iterator[ValError]:
         match statement:
             case Instruction("CALL" | "GOSUB", arguments, at=at, program=name):
                 called = self._programs.get(name)
@@ -219,16 +217,16 @@ class _Checker:
 def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
     i = step.statement
-    if not isinstance(head.statement, Instruction) or head.statement.keyword != "CASE":
+    if head.statement.keyword != "CASE":
         return
     (given,) = head.statement.operands
-    values = i.operands if isinstance(i, Instruction) and i.keyword in ("VALUE", "CASE") else ()
+    values = i.operands if i.keyword in ("VALUE", "CASE") else ()
     wanted: Kind = "string" if kind_of(given, known) == "string" else "real"
     for value in values:
         yield from mistakes(value, wanted, known)
 
 
-def _given(statement: Statement) -> str:
+def _given(statement: Instruction) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
         case Instruction("=" | "DECOMPOSE" | "FOR"):
@@ -245,7 +243,7 @@ def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
         yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
 
 
-def _set_parameter(statement: Statement) -> Iterator[ValError]:
+def _set_parameter(statement: Instruction) -> Iterator[ValError]:
     """A number that a parameter can't be."""
     match statement:
         case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
@@ -255,9 +253,9 @@ def _set_parameter(statement: Statement) -> Iterator[ValError]:
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _capped(statement: Statement) -> Iterator[ValError]:
+def _capped(statement: Instruction) -> Iterator[ValError]:
     """Shares that are written down and count as less."""
-    shares = ("percent",) if {"MMPS", "IPS"} & set(getattr(statement, "words", ())) else ("percent", "speed")
+    shares = ("percent",) if {"MMPS", "IPS"} & set(statement.words) else ("percent", "speed")
     for operand, kind in _operands(statement):
         value = literal(operand)
         if kind in shares and value is not None and value > MOST_PERCENT:
@@ -289,7 +287,7 @@ def _alike_names(text: str) -> Iterator[CheckFinding]:
                 yield _warning(ValError("Long names", detail, place=TextPosition(number, found.start() + 1)))
 
 
-def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
+def _operands(i: Instruction) -> Iterator[tuple[Expression, Kind]]:
     """The operands of an instruction, and what kind each has to be of: `variable` for what it may set."""
     match i:
         case Instruction("=" | "SET", (target, value)):
@@ -307,22 +305,22 @@ def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
             yield only, "any"
         case Instruction("CALL" | "GOSUB", given):
             yield from ((a, "variable" if isinstance(a, Variable) else "any") for a in given if a is not None)
-        case Instruction(keyword, operands) if keyword not in ("", "AUTO", "LOCAL", "GLOBAL"):
-            row = forms.INSTRUCTIONS[keyword]
+        case Instruction(keyword, operands, passed=None) if keyword not in ("AUTO", "LOCAL", "GLOBAL"):
+            row = STATEMENTS[keyword]
             for n, operand in enumerate(operands if row.slots else ()):
                 if operand is not None and not isinstance(operand, Format):
                     yield operand, row.slot(n).kind
 
 
-def reads(statement: Statement) -> list[tuple[Expression, Kind]]:
+def reads(statement: Instruction) -> list[tuple[Expression, Kind]]:
     """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
     found = [one for one in _operands(statement) if one[1] != "variable"]
-    if isinstance(statement, Instruction) and statement.begins is not None:
+    if statement.begins is not None:
         found.append((statement.begins, "real"))
     return found + [(index, "real") for target in writes(statement) for index in target.indices]
 
 
-def writes(statement: Statement) -> Iterator[Variable]:
+def writes(statement: Instruction) -> Iterator[Variable]:
     """The variables that a statement may set; `$DECODE` shortens its first argument."""
     for operand, kind in _operands(statement):
         if kind == "variable" and isinstance(operand, Variable):

@@ -25,11 +25,9 @@ from interfaces.val2.context import (
     Action,
     Asked,
     Context,
-    Finished,
+    Ending,
     Invoke,
-    Leave,
     StepFunction,
-    Suspend,
     Typed,
     Waiting,
 )
@@ -76,9 +74,8 @@ class ProgramCompiler(Expressions):
         self.names = len(program.parameters)
         self.kept: dict[int, int] = {}
         for i in (step.statement for step in program.steps):
-            if not isinstance(i, Instruction) or i.keyword not in ("AUTO", "LOCAL"):
-                continue
-            for name in (v.name for v in i.operands if v.name not in scope):
+            own = i.operands if i.keyword in ("AUTO", "LOCAL") else ()
+            for name in (v.name for v in own if v.name not in scope):
                 if i.keyword == "AUTO":
                     scope[name] = self.names
                     self.names += 1
@@ -353,9 +350,9 @@ def _alteration(do: Do) -> Act:
     return act
 
 
-def _ending(end: Callable[[Instruction, int], Finished | Suspend]) -> Act:
-    """What ends or pauses a program when the arm stands."""
-    return lambda x, i, n: x.special(lambda _: Waiting(_standing(x.context, lambda: None, end(i, n))))
+def _end_run(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """PAUSE, STOP, HALT, when the arm stands."""
+    return x.special(lambda _: Waiting(_standing(x.context, lambda: None, Ending(i.keyword, n + 1))))
 
 
 def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -449,7 +446,7 @@ def _divide(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
 
 
 def _leave(x: ProgramCompiler, _i: Instruction, _n: int) -> StepFunction:
-    action = Leave()
+    action = Ending("RETURN")
     return x.special(lambda _: action)
 
 
@@ -467,7 +464,7 @@ def _end(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
     if block.kind != "FOR":
         return lambda _: target
     k, body, following = x.keep(block.start), block.start + 1, n + 1
-    variable: Variable = x.program.steps[block.start].statement.operands[0]  # type: ignore[union-attr]
+    variable: Variable = x.program.steps[block.start].statement.operands[0]
 
     def again(s: Slots) -> int:
         kept = s[k]
@@ -510,7 +507,7 @@ def _case(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     for arm in block.arms:
         statement = x.program.steps[arm].statement
         if statement.keyword == "VALUE":
-            arms.append(([x.of_kind(kind, v) for v in statement.operands], arm + 1))  # type: ignore[union-attr]
+            arms.append(([x.of_kind(kind, v) for v in statement.operands], arm + 1))
         else:
             otherwise = arm + 1
 
@@ -832,10 +829,9 @@ _CONTROL: Final = (
          usage="CALL program(argument, ..)"),
     Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program"),
     Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program"),
-    Form("PAUSE", "", "Pause until PROCEED.", "VAL", _ending(lambda _, n: Suspend(n + 1))),
-    Form("STOP", "", "End this cycle of the program.", "VAL", _ending(lambda i, _: Finished(i.keyword))),
-    Form("HALT", "", "End the program, whatever cycles are left.", "VAL",
-         _ending(lambda i, _: Finished(i.keyword))),
+    Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
+    Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
+    Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
 )  # fmt: skip
 
 _DIALOGUE: Final = (

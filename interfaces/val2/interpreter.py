@@ -13,13 +13,11 @@ from interfaces.val2.context import (
     Action,
     Code,
     Context,
-    Finished,
+    Ending,
     Invoke,
-    Leave,
     ProgramEnded,
     ProgramFailed,
     ProgramPaused,
-    Suspend,
     Waiting,
 )
 from interfaces.val2.errors import ValError
@@ -182,13 +180,13 @@ class Task:
             case Invoke(code, slots, following):
                 self._push(CallFrame(code, slots, frame.level))
                 frame.pc = following
-            case Leave():
+            case Ending("RETURN"):
                 self._leave(frame)
-            case Finished(word):
-                self._finish(word)
-            case Suspend(step):
+            case Ending("PAUSE", step):
                 frame.pc = step
                 self.pause("PAUSE")
+            case Ending(word):
+                self._finish(word)
 
     def _push(self, frame: CallFrame) -> None:
         if len(self.frames) >= MOST_CALLS:
@@ -288,7 +286,7 @@ class Task:
         self.state, self.word, self.single = ProgramState.RUNNING, "", single
 
 
-def _resting(context: Context) -> Generator[float, None, Finished]:
+def _resting(context: Context) -> Generator[float, None, Ending]:
     """Wait for the arm to stand, and end."""
     yield from until(context, context.arm.settled)
-    return Finished("END")
+    return Ending("END")

@@ -13,10 +13,9 @@ from interfaces.val2.syntax import (
     Compound,
     Expression,
     Format,
-    Ignored,
+    Instruction,
     Number,
     Program,
-    Statement,
     Step,
     Text,
     Variable,
@@ -136,10 +135,10 @@ def _format(item: Format) -> str:
     return f"/{item.code}{width}" + ("" if item.decimals is None else f".{item.decimals}")
 
 
-def print_statement(statement: Statement) -> str:
+def print_statement(statement: Instruction) -> str:
     """The text of a statement."""
-    if isinstance(statement, Ignored):
-        return f"{statement.keyword} {statement.rest}".rstrip()
+    if statement.passed is not None:
+        return f"{statement.keyword} {statement.passed}".rstrip()
     if statement.begins is not None:
         return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
     keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
@@ -187,7 +186,7 @@ def print_program(program: Program) -> str:
     level = 0
     for step in program.steps:
         i = step.statement
-        goes = isinstance(i, Ignored) or (i.keyword == "IF" and len(i.operands) > 1)
+        goes = i.passed is not None or (i.keyword == "IF" and len(i.operands) > 1)
         tags = frozenset[str]() if goes else STATEMENTS[i.keyword].tags
         level = max(level - ("closes" in tags), 0)
         lines.append(_line(step, level))

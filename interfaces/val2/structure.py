@@ -125,7 +125,7 @@ class _Surveyor:
             case statement:
                 if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
                     self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
-                if isinstance(statement, Instruction) and statement.keyword in _KINDS:
+                if statement.keyword in _KINDS:
                     if len(self._open) == DEEPEST:
                         self._fail(i, f"more than {DEEPEST} levels")
                     self._open.append(_Open(statement.keyword, i))  # type: ignore[arg-type]
