@@ -690,7 +690,8 @@ def _wanted(names: tuple[Variable, ...]) -> str:
 
 # The table.
 
-_MOTION: Final = (
+_ROWS: Final = (
+    # Motions.
     Form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", _motion(_move)),
     Form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", _motion(_move)),
     Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL",
@@ -719,9 +720,7 @@ _MOTION: Final = (
          _at_rest(_nothing, lambda c, _: c.arm.brake(now=c.now))),
     Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
          _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]"),
-)  # fmt: skip
-
-_SETTINGS: Final = (
+    # Settings.
     Form("SPEED", "speed:speed, turning:percent?",
          "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.", "VAL", _now(_speed),
          words="MMPS|IPS|MONITOR ALWAYS", tags="beside"),
@@ -760,9 +759,7 @@ _SETTINGS: Final = (
          _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),
     Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode"),
     Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
-)  # fmt: skip
-
-_HAND: Final = (
+    # Hand.
     Form("OPEN", "", "Open the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(True))),
     Form("CLOSE", "", "Close the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(False))),
     Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
@@ -775,9 +772,7 @@ _HAND: Final = (
          _at_rest(lambda c, _: c.arm.actuate(None, now=c.now))),
     Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
          _grasp),
-)  # fmt: skip
-
-_LOCATIONS: Final = (
+    # Locations.
     Form("SET", "variable:variable, location:location", "Assign a location.", "VAL", _set,
          usage="SET variable = location", tags="beside"),
     Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", _here,
@@ -786,9 +781,7 @@ _LOCATIONS: Final = (
          "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside"),
     Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", _passed,
          usage="SHIFT variable BY dx, dy, dz"),
-)  # fmt: skip
-
-_SIGNALS: Final = (
+    # Signals and time.
     Form("SIGNAL", "number:output*", "Turn outputs on, or off where negative.", "VAL",
          _now(lambda c, _, *numbers: c.signals.set(numbers)), tags="beside"),
     Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
@@ -802,9 +795,7 @@ _SIGNALS: Final = (
          words="ALWAYS"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
          _now(lambda c, _, signal: c.reactions.ignore(signal))),
-)  # fmt: skip
-
-_CONTROL: Final = (
+    # Control.
     Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program"),
     Form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", _divide,
@@ -832,9 +823,7 @@ _CONTROL: Final = (
     Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
     Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
     Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
-)  # fmt: skip
-
-_DIALOGUE: Final = (
+    # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside"),
     Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt),
     Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text"),
@@ -846,9 +835,7 @@ _DIALOGUE: Final = (
          usage="GLOBAL [REAL|LOC] name, ..", tags="program"),
 )  # fmt: skip
 
-INSTRUCTIONS: Final[dict[str, Form]] = {
-    row.name: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
-}
+INSTRUCTIONS: Final[dict[str, Form]] = {row.name: row for row in _ROWS}
 """Keywords of a program's lines."""
 STATEMENTS: Final = {
     **INSTRUCTIONS,
