@@ -142,31 +142,28 @@ def print_statement(statement: Instruction) -> str:
     if statement.begins is not None:
         return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
     keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
-    match keyword, [_item(operand) for operand in statement.operands]:
-        case "=", [target, value]:
-            return f"{target} = {value}"
-        case "SET" | "DECOMPOSE" | "TIMER", [target, value]:
-            return f"{keyword} {target} = {value}"
-        case "PARAMETER", [value]:
-            return f"PARAMETER {words[0]} = {value}"
-        case "IF", [condition, *label]:
-            return f"IF {condition} GOTO {label[0]}" if label else f"IF {condition} THEN"
-        case "WHILE", [condition]:
-            return f"WHILE {condition} DO"
-        case "FOR", [variable, start, stop, *step]:
-            return " ".join([f"FOR {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
-        case "CASE", [value]:
-            return f"CASE {value} OF"
-        case "VALUE", _:
-            return f"VALUE {listed}:"
-        case "CALL" | "GOSUB", given:
+    match STATEMENTS[keyword].rule, [_item(operand) for operand in statement.operands]:
+        case "assignment" | "timing", [target, value]:
+            return f"{keyword} {target} = {value}".removeprefix("= ")
+        case "parameter", [value]:
+            return f"{keyword} {words[0]} = {value}"
+        case "branch", [condition, *label]:
+            return f"{keyword} {condition} " + (f"GOTO {label[0]}" if label else "THEN")
+        case "while", [condition]:
+            return f"{keyword} {condition} DO"
+        case "loop", [variable, start, stop, *step]:
+            return " ".join([f"{keyword} {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
+        case "case", [value]:
+            return f"{keyword} {value} OF"
+        case "values", _:
+            return f"{keyword} {listed}:"
+        case "call", given:
             return f"{keyword} {statement.program}" + (f"({listed})" if given or keyword == "CALL" else "")
-        case "REACT" | "REACTI", [signal]:
-            called = f"{signal}, {statement.program}" if statement.program else signal
-            return " ".join([keyword, called, *words])
-        case "ENABLE" | "DISABLE", _:
+        case "reaction", [signal]:
+            listed = f"{signal}, {statement.program}" if statement.program else signal
+        case "switches", _:
             return f"{keyword} {', '.join(words)}"
-        case "AUTO" | "LOCAL" | "GLOBAL", _:
+        case "names", _:
             return " ".join([keyword, *words, listed])
     return " ".join(filter(None, (keyword, listed, *words)))
 

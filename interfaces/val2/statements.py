@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
@@ -254,10 +254,9 @@ def statement(keyword: str, rest: OperandText) -> Instruction:
     """
     row = forms.INSTRUCTIONS.get(keyword)
     if row is not None:
-        rule = _RULES.get(keyword, _instruction)
-        if isinstance(rule, str):
-            return Instruction(keyword, tuple(_given(rest.by_rule(row, rule))), (), rest.at)
-        return rule(row, rest)
+        if row.rule in _READERS:
+            return _READERS[row.rule](row, rest)
+        return Instruction(keyword, tuple(_given(rest.by_rule(row, row.rule))), (), rest.at)
     if keyword in forms.IGNORED:
         return rest.passed_over(keyword)
     if rest.text.lstrip().startswith("=="):
@@ -281,7 +280,7 @@ def assignment(rest: OperandText) -> Instruction:
 
 def _instruction(row: Form, rest: OperandText) -> Instruction:
     """Operands between commas, and words behind them."""
-    if row.name in ("ACCEL", "ALTER", "ALTON") and (found := _CHANNEL.match(rest.text)):
+    if row.rule == "channel" and (found := _CHANNEL.match(rest.text)):
         # `ALTER (1) 3` reads like `ALTER 1, 3`.
         channel = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
         rest.text = f"{found[1]} {channel},{found[3]}{rest.text[found.end() :]}"
@@ -443,15 +442,9 @@ def _local(row: Form, rest: OperandText) -> Instruction:
     return Instruction(row.name, tuple(rest.by_rule(row, "names")), words, rest.at)
 
 
-_RULES: Final[dict[str, str | Callable[[Form, OperandText], Instruction]]] = {
-    "SET": "assignment", "DECOMPOSE": "assignment", "TIMER": "timing", "IF": "branch", "WHILE": "while",
-    "UNTIL": "until", "FOR": "loop", "CASE": "case", "TYPE": "items",
-    **dict.fromkeys(("ELSE", "END", "DO", "RETURN", "ANY"), _bare),
-    **dict.fromkeys(("ENABLE", "DISABLE"), _switches),
-    **dict.fromkeys(("REACT", "REACTI"), _react),
-    **dict.fromkeys(("EXIT", "NEXT"), _loops),
-    **dict.fromkeys(("CALL", "GOSUB"), _call),
-    **dict.fromkeys(("AUTO", "LOCAL", "GLOBAL"), _local),
-    "AT": _at, "PARAMETER": _setting, "SHIFT": _shift, "VALUE": _value, "GOTO": _goto, "PROMPT": _prompt,
+_READERS: Final[Mapping[str, Callable[[Form, OperandText], Instruction]]] = {
+    "operands": _instruction, "channel": _instruction, "nothing": _bare, "timed": _at, "shift": _shift,
+    "parameter": _setting, "switches": _switches, "reaction": _react, "goto": _goto, "values": _value,
+    "loops": _loops, "call": _call, "prompt": _prompt, "names": _local,
 }  # fmt: skip
-"""What stands behind keywords where it isn't operands between commas: a rule of the grammar, or what reads it."""
+"""What reads what stands behind a keyword, by the rule of its row, where that isn't a rule of the grammar alone."""
