@@ -64,7 +64,9 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFindi
     found = [_error(error) for error in unreadable.values()]
     if not source.programs and not unreadable:
         found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
-    found += check(source, unreadable.keys(), words_of(text, unreadable))
+    checker = _Checker(source, unreadable.keys(), words_of(text, unreadable))
+    for program in source.programs:
+        found += checker.program(program)
     found += _alike_names(text)
     return None if unreadable else source, sorted(found, key=_order)
 
@@ -74,71 +76,51 @@ def _order(finding: CheckFinding) -> tuple[int, int]:
     return (0, 0) if place is None else (place.line, place.column)
 
 
-def check(source: SourceFile, unreadable: Collection[int] = (), words: Collection[str] = ()) -> list[CheckFinding]:
-    """What is wrong with the programs of a file, one after the other.
-
-    Args:
-        source: The file.
-        unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
-        words: Names that those lines may have set.
-    """
-    checker = _Checker(source, unreadable, words)
-    return [finding for program in source.programs for finding in checker.program(program)]
-
-
 class _Checker:
+    """What is wrong with the programs of a file."""
+
     def __init__(self, source: SourceFile, unreadable: Collection[int], words: Collection[str]) -> None:
+        """Gather what the file sets.
+
+        Args:
+            source: The file.
+            unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
+            words: Names that those lines may have set.
+        """
         self._unreadable = unreadable
         self._programs = {program.name: program for program in source.programs}
         self._context = Context(Arm(EngineRobot(Engine(puma560.model()))), compiled)
         """For what compiling shows; nothing runs in it."""
-        self._set: dict[str, set[str]] = defaultdict(set)
-        """Programs by which names are set; the empty name stands for all."""
-        self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        """Kinds of what names were set to, by their scopes; the empty name stands for all."""
-        for entry in source.values:
-            self._set[""].add(entry.variable.name)
-        for entry in source.locations:
-            self._known[""][entry.variable.name].add("frame")
-        for entry in source.reals:
-            self._known[""][entry.variable.name].add("real")
+        self._set: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        """Names that are set, by the programs whose own they are, and the kinds of what they're set to; the empty
+        name stands for all programs."""
+        for kind, entries in (("frame", source.locations), ("real", source.reals), ("string", source.strings)):
+            for entry in entries:
+                self._set[""][entry.variable.name].add(kind)
         for program in source.programs:
-            self._gather(program)
-        self._set[""].update(words)
-
-    def _gather(self, program: Program) -> None:
-        own = self._own(program)
-        for parameter in program.parameters:
-            self._set[program.name].add(parameter.name)
-        for step in program.steps:
-            for variable in writes(step.statement):
-                scope = program.name if variable.name in own else ""
-                self._set[scope].add(variable.name)
-                self._known[scope][variable.name].add(_given(step.statement))
+            own = self._own(program)
+            self._set[program.name] |= {parameter.name: set() for parameter in program.parameters}
+            for i in (step.statement for step in program.steps):
+                for name in (variable.name for variable in writes(i)):
+                    self._set[program.name if name in own else ""][name].add(_given(i))
+        for word in words:
+            self._set[""][word].update()
 
     @staticmethod
-    def _own(program: Program) -> frozenset[str]:
+    def _own(program: Program) -> set[str]:
         """Names that are the program's own."""
-        names = {parameter.name for parameter in program.parameters}
-        for step in program.steps:
-            match step.statement:
-                case Instruction("AUTO" | "LOCAL", variables):
-                    names |= {variable.name for variable in variables}
-        return frozenset(names)
+        local = (step.statement for step in program.steps if step.statement.keyword in ("AUTO", "LOCAL"))
+        return {v.name for v in (*program.parameters, *(v for i in local for v in i.operands))}
 
     def program(self, program: Program) -> Iterator[CheckFinding]:
         """What is wrong with a program."""
         structure, errors = survey(program)
         yield from (_error(e) for e in errors if e.place is None or e.place.line not in self._unreadable)
-        own = self._own(program)
-        parameters = {parameter.name for parameter in program.parameters}
+        own, parameters = self._own(program), {parameter.name for parameter in program.parameters}
+        usable = {name: kinds for name, kinds in self._set[""].items() if name not in own} | self._set[program.name]
         known = {
-            name: next(iter(given))
-            for scope in ("", program.name)
-            for name, given in self._known[scope].items()
-            if len(given) == 1 and name not in parameters and (scope or name not in own)
+            name: next(iter(kinds)) for name, kinds in usable.items() if len(kinds) == 1 and name not in parameters
         }
-        usable = self._set[program.name] | {name for name in self._set[""] if name not in own}
         reported: set[str] = set()
         for number, step in enumerate(program.steps, 1):
             if step.at.line in self._unreadable:
@@ -152,7 +134,7 @@ class _Checker:
                 yield CheckFinding(finding.severity, error, error.place)
 
     def _step(
-        self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
+        self, step: Step, known: dict[str, str], usable: Collection[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         statement, read = step.statement, reads(step.statement)
         if statement.passed is not None and statement.keyword not in forms.UNAVAILABLE:
@@ -174,7 +156,7 @@ class _Checker:
             yield from self._unset(expression, asked, usable, reported)
 
     def _unset(
-        self, expression: Expression, asked: Kind, usable: set[str], reported: set[str]
+        self, expression: Expression, asked: Kind, usable: Collection[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         """Names that nothing in the file sets, each once in a program; functions that do nothing."""
         match expression:
