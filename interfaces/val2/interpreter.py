@@ -205,14 +205,11 @@ class Task:
             self.context.memory.release(slot)
 
     def _finish(self, word: str) -> None:
-        self._unwind()
         if word == "HALT" or self.cycles in (0, 1):
-            self.state, self.word, self.cycles = ProgramState.IDLE, word, 0
-            self._forget()
-            self.context.events.append(
-                ProgramEnded(self.code.program.name, word if self.code.program.name else "DO")
-            )
+            self.cycles = 0
+            self.end(word if self.code.program.name else "DO")
             return
+        self._unwind()
         self.cycles = max(self.cycles - 1, -1)
         self.frames = [CallFrame(self.code, self.code.slots(self.arguments))]
         self.context.arm.begin_program()
@@ -258,13 +255,9 @@ class Task:
         """End now."""
         self._unwind()
         self.state, self.word = ProgramState.IDLE, word
-        self._forget()
-        self.context.events.append(ProgramEnded(self.code.program.name, word))
-
-    def _forget(self) -> None:
-        """Watch no signals any more; a DO leaves the paused program's alone."""
-        if self.code.program.name:
+        if self.code.program.name:  # A DO leaves what a paused program watches alone.
             self.context.reactions.clear()
+        self.context.events.append(ProgramEnded(self.code.program.name, word))
 
     def fail(self, error: ValError) -> None:
         """Stand at the present step, for an error."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Final
 
@@ -85,17 +86,8 @@ def number(value: float) -> str:
 
 def string(value: str) -> tuple[str, int]:
     """The text of a string, with `$CHR` for what can't stand between quotes, and how tightly it binds."""
-    parts: list[str] = []
-    plain = ""
-    for character in value:
-        if character in '"\r\n':
-            parts += [f'"{plain}"'] if plain else []
-            parts.append(f"$CHR({ord(character)})")
-            plain = ""
-        else:
-            plain += character
-    if plain or not parts:
-        parts.append(f'"{plain}"')
+    pieces = [piece for piece in re.split(r'(["\r\n])', value) if piece] or [""]
+    parts = [f"$CHR({ord(piece)})" if piece and piece in '"\r\n' else f'"{piece}"' for piece in pieces]
     return " + ".join(parts), TIGHTEST if len(parts) == 1 else OPERATORS["+"].level
 
 
