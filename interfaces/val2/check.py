@@ -317,9 +317,10 @@ def writes(statement: Instruction) -> Iterator[Variable]:
 def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
     """The parts of an expression, and what kind each has to be of; those of `+` and relations have to be alike."""
     if isinstance(expression, Apply):
+        row = row_of(expression)
         for n, argument in enumerate(expression.arguments):
             if argument is not None and not isinstance(argument, Format):
-                yield argument, row_of(expression).slot(n).kind
+                yield argument, row.slot(n).kind
     else:
         kind: Kind = "frame" if isinstance(expression, Compound) else "real"
         yield from ((child, kind) for child in children(expression))
@@ -361,13 +362,15 @@ _STANDING: Final = ("HERE", "DEST")
 
 def _misused(expression: Expression, asked: Kind) -> Iterator[ValError]:
     """What is wrong with the numbers that are written down."""
-    if (value := literal(expression)) is not None and asked in _CHECKS:
+    value = literal(expression)
+    if value is None:
+        for part, kind in wanted(expression):
+            yield from _misused(part, kind)
+    elif asked in _CHECKS:
         try:
             _CHECKS[asked](value)
         except ValError as error:
             yield error.at(place=expression.at)
-    for part, kind in wanted(expression):
-        yield from _misused(part, kind)
 
 
 def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:
