@@ -19,6 +19,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
 from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
+from interfaces.val2.rows import Form, Setting
 
 Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
 """Carries a command out, with what follows its name; what asks, or None."""
@@ -273,7 +274,7 @@ def _files(state: TerminalState, _before: str) -> Iterable[Suggestion]:
     return [Suggestion(one) for one in state.files.listed()]
 
 
-def _rows(table: Mapping[str, forms.Form | forms.Switch | forms.Parameter]) -> Completer:
+def _rows(table: Mapping[str, Form | Setting]) -> Completer:
     return lambda _state, _before: [Suggestion(one.name, one.help) for one in table.values()]
 
 

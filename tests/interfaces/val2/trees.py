@@ -15,7 +15,6 @@ from interfaces.val2.syntax import (
     Apply,
     Compound,
     Format,
-    Ignored,
     Instruction,
     Number,
     Program,
@@ -199,9 +198,9 @@ statements = st.one_of(
         st.lists(variables(numbers), min_size=1, max_size=3),
         words=st.sampled_from([(), ("REAL",), ("LOC",)]),
     ),
-    st.builds(Ignored, ignored, rests),
-    st.just(Ignored("DISABLE", "color.speed, scale")),
-    st.just(Ignored("PARAMETER", "vscale = 3")),
+    st.builds(Instruction, ignored, passed=rests),
+    st.just(Instruction("DISABLE", passed="color.speed, scale")),
+    st.just(Instruction("PARAMETER", passed="vscale = 3")),
 )
 comments = st.none() | st.text(
     st.characters(blacklist_characters="\r\n", blacklist_categories=["Cs"]), max_size=20
