@@ -92,7 +92,7 @@ class MonitorCommand:
         """Whether it changes nothing, with what follows its name."""
         if self.need is not Need.ARGUMENT:
             return self.need is Need.LOOK
-        return rest in {"", "?"} or (self.name == "PARAMETER" and "=" not in rest)
+        return rest in {"", "?"} or ("=" in self.forms and "=" not in rest)
 
 
 _ASSIGNMENT: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9._]*(\[[^\]]*\])?\s*=(?!=).*", re.DOTALL)
@@ -226,7 +226,7 @@ def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tu
     if program:
         known = _instruction(state, before)
     elif not word:
-        known = (Suggestion(one.name, one.help) for one in COMMANDS.values())
+        known = iter(_rows(COMMANDS)(state, before))
     else:
         named = command_named(word)
         known = iter(named.completes(state, before.lstrip()[len(word) :]) if named else ())
@@ -273,7 +273,7 @@ def _files(state: TerminalState, _before: str) -> Iterable[Suggestion]:
     return [Suggestion(one) for one in state.files.listed()]
 
 
-def _rows(table: Mapping[str, forms.Form | forms.Switch | forms.Parameter]) -> Completer:
+def _rows(table: Mapping[str, MonitorCommand | forms.Form | forms.Switch | forms.Parameter]) -> Completer:
     return lambda _state, _before: [Suggestion(one.name, one.help) for one in table.values()]
 
 
@@ -323,6 +323,11 @@ def hint(text: str, *, program: bool = False) -> str:
 _LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
 _LOCATIONS, _REALS, _STRINGS = _names("location", "point"), _names("real"), _names("string")
 _SWITCHES, _STORED = _rows(forms.SWITCHES), _until("=", _files, _programs)
+_KINDS: Final = (
+    ("P", "programs", "program", _programs), ("L", "locations", "location", _until("=:", _LOCATIONS)),
+    ("R", "reals", "real", _REALS), ("S", "strings", "$string", _STRINGS),
+)  # fmt: skip
+"""Of which there are some commands each: last letter, what they are about, a form, and what completes it."""
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "",
                    "Stop the program and the arm, within its limits; Ctrl-C does the same."),
@@ -335,14 +340,6 @@ _TABLE: Final = (
     MonitorCommand("COPY", partial(storage.put, keep=True), "new=old", "Copy a program.", completes=_programs),
     MonitorCommand("DELETE", partial(storage.delete, kind="programs"), "program,..",
                    "Delete programs; asks first.", completes=_programs, idle=True),
-    MonitorCommand("DELETEL", partial(storage.delete, kind="locations"), "location,..",
-                   "Delete locations; asks first.", completes=_until("=:", _LOCATIONS), idle=True),
-    MonitorCommand("DELETEP", partial(storage.delete, kind="programs"), "program,..",
-                   "Delete programs; asks first.", completes=_programs, idle=True),
-    MonitorCommand("DELETER", partial(storage.delete, kind="reals"), "real,..", "Delete reals; asks first.",
-                   completes=_REALS, idle=True),
-    MonitorCommand("DELETES", partial(storage.delete, kind="strings"), "$string,..", "Delete strings; asks first.",
-                   completes=_STRINGS, idle=True),
     MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", _LOOK, _programs, more=True),
     MonitorCommand("DISABLE", partial(running.turn, on=False), "switch,..", "Turn switches off.",
                    completes=_SWITCHES),
@@ -398,14 +395,6 @@ _TABLE: Final = (
     MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK),
     MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
                    "Write programs, with all that they use, to a file.", completes=_STORED),
-    MonitorCommand("STOREL", partial(storage.store, parts="locations"), "file[=location,..]",
-                   "Write locations to a file.", completes=_STORED),
-    MonitorCommand("STOREP", partial(storage.store, parts="programs"), "file[=program,..]",
-                   "Write programs to a file.", completes=_STORED),
-    MonitorCommand("STORER", partial(storage.store, parts="reals"), "file[=real,..]", "Write reals to a file.",
-                   completes=_STORED),
-    MonitorCommand("STORES", partial(storage.store, parts="strings"), "file[=$string,..]",
-                   "Write strings to a file.", completes=_STORED),
     MonitorCommand("SWITCH", running.switch, "| switch,..", "Show switches.", _LOOK, _SWITCHES),
     MonitorCommand("TEACH", locations.teach, "location", "Record one location after the other, each by CR; E ends.",
                    completes=_until("=:", _LOCATIONS), idle=True),
@@ -420,9 +409,15 @@ _TABLE: Final = (
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
                    "Begin a program step by step, or do its next step.", completes=_programs, idle=True),
     MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
+    *(MonitorCommand(f"DELETE{letter}", partial(storage.delete, kind=kind), f"{form},..",
+                     f"Delete {kind}; asks first.", completes=completes, idle=True)
+      for letter, kind, form, completes in _KINDS),
+    *(MonitorCommand(f"STORE{letter}", partial(storage.store, parts=kind), f"file[={form},..]",
+                     f"Write {kind} to a file.", completes=_STORED)
+      for letter, kind, form, _ in _KINDS),
 )  # fmt: skip
 
-COMMANDS: Final = {command.name: command for command in _TABLE}
+COMMANDS: Final = {row.name: row for row in sorted(_TABLE, key=lambda row: row.name)}
 """By name."""
 SHORT: Final = {
     "A": "ABORT",
