@@ -1,4 +1,4 @@
-"""Write what is derived from the definitions of messages: the script that checks them in pages, documents' tables.
+"""Write what is derived from definitions: of messages the script that checks them in pages; tables of documents.
 
 `make generate` writes them, `python .ci/generate.py --check` says which are stale.
 """
@@ -30,10 +30,11 @@ from interfaces.messages.description import (
 from interfaces.messages.fields import Party
 from interfaces.recording.channels import CHANNELS
 from interfaces.stream.codec import KINDS
+from interfaces.val2.monitor.commands import COMMANDS
 
 HOME = Path(__file__).resolve().parents[1]
 SCRIPT = HOME / "interfaces" / "stream" / "static" / "protocol.js"
-DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md"
+DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md", HOME / "docs" / "console.md"
 COMMAND = "make generate"
 
 
@@ -372,7 +373,7 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (fields|messages|roles|words)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(r"<!-- (commands|fields|messages|roles|words)(?:: ([\w -]+))? -->\n.*?<!-- end -->", re.S)
 
 
 def document(text: str, found: Iterable[MessageDescription]) -> str:
@@ -391,6 +392,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         what, name = match[1], match[2]
         if what == "roles":
             rows = _roles_table(known)
+        elif what == "commands":
+            rows = _commands_table()
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
@@ -402,6 +405,15 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         return "\n".join([head, "", *rows, "", "<!-- end -->"])
 
     return MARKED.sub(table, text)
+
+
+def _commands_table() -> list[str]:
+    """The monitor's commands: * beside a program that runs, too; + ours."""
+    rows = ["| command | does |", "|---|---|"]
+    for one in COMMANDS.values():
+        marks = " +" * one.ours + " *" * (not one.idle)
+        rows.append(_row(" ".join(f"`{usage}`" for usage in one.usage) + marks, one.help))
+    return rows
 
 
 def _fields_table(name: str, message: MessageDescription, tags: dict[str, str]) -> list[str]:
@@ -542,11 +554,12 @@ def _figure(number: Any) -> str:
 def derived() -> dict[Path, str]:
     """Every file that has something derived, as it's to be."""
     found, stored = messages(), recorded()
-    protocol, recording = DOCUMENTS
+    protocol, recording, console = DOCUMENTS
     return {
         SCRIPT: script(found),
         protocol: document(protocol.read_text(encoding="utf-8"), found),
         recording: document(recording.read_text(encoding="utf-8"), stored),
+        console: document(console.read_text(encoding="utf-8"), ()),
     }
 
 
@@ -559,7 +572,7 @@ def main(asked: list[str]) -> int:
     """Write what is stale, or with `--check` only name it."""
     for path in (found := stale()):
         if "--check" in asked:
-            print(f"{path.relative_to(HOME)} isn't what the definitions of messages say: run `{COMMAND}`")
+            print(f"{path.relative_to(HOME)} isn't what the definitions say: run `{COMMAND}`")
         else:
             path.write_text(derived()[path], encoding="utf-8")
             print(f"wrote {path.relative_to(HOME)}")

@@ -147,34 +147,44 @@ def _near(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def explained(word: str) -> Iterator[tuple[str, str, str]]:
-    """What a word is, how it's written, and what it does; a word may be several things."""
+class Explanation(NamedTuple):
+    """One of the things that a word is."""
+
+    kind: str
+    usage: str
+    """How it's written."""
+    help: str
+    """What it does."""
+    origin: str = ""
+    """Whose it is; empty where that isn't said."""
+
+
+def explained(word: str) -> Iterator[Explanation]:
+    """What a word is; it may be several things."""
     upper = word.upper()
     if upper in COMMANDS:
         one = COMMANDS[upper]
-        mark = ", ours" if one.ours else ""
-        yield f"command{mark}", " | ".join(one.usage), one.help
-    if upper in forms.INSTRUCTIONS:
-        form = forms.INSTRUCTIONS[upper]
-        yield f"instruction, {form.origin}", form.usage, form.help
-    for name in (upper, f"${upper}", f"#{upper}"):
-        if name in forms.FUNCTIONS:
-            function = forms.FUNCTIONS[name]
-            yield f"function, {function.origin}", function.usage, function.help
+        yield Explanation("command", " | ".join(one.usage), one.help, "ours" if one.ours else "")
+    for kind, table, names in (
+        ("instruction", forms.INSTRUCTIONS, (upper,)),
+        ("function", forms.FUNCTIONS, (upper, f"${upper}", f"#{upper}")),
+    ):
+        for form in (table[name] for name in names if name in table):
+            yield Explanation(kind, form.usage, form.help, form.origin)
     if upper in forms.SWITCHES:
-        one_switch = forms.SWITCHES[upper]
-        yield f"switch, {one_switch.origin}", f"ENABLE {upper} | DISABLE {upper}", one_switch.help
+        switch = forms.SWITCHES[upper]
+        yield Explanation("switch", f"ENABLE {upper} | DISABLE {upper}", switch.help, switch.origin)
     if upper in forms.PARAMETERS:
         row = forms.PARAMETERS[upper]
         said = f"{row.help} {layout.number(row.low)} to {layout.number(row.high)} {row.unit}."
-        yield f"parameter, {row.origin}", f"PARAMETER {upper} = value", said
-    for table, kind in ((forms.OPERATORS, "operator"), (forms.WORDS, "word")):
-        if upper in table:
-            yield kind, upper, table[upper]
+        yield Explanation("parameter", f"PARAMETER {upper} = value", said, row.origin)
+    for kind, words in (("operator", forms.OPERATORS), ("word", forms.WORDS)):
+        if upper in words:
+            yield Explanation(kind, upper, words[upper])
     if upper in forms.IGNORED and upper not in COMMANDS:
         why = forms.UNAVAILABLE.get(upper)
         passed = "It's recognised in programs, and passed over: it has no meaning here."
-        yield "instruction, V+", upper, passed if why is None else f"It isn't available: {why}."
+        yield Explanation("instruction", upper, passed if why is None else f"It isn't available: {why}.", "V+")
 
 
 def help_(state: TerminalState, rest: str) -> None:
@@ -192,10 +202,10 @@ def help_(state: TerminalState, rest: str) -> None:
     explanations = list(explained(rest)) or list(explained(whole))
     if not explanations:
         raise ValError("Unknown word", f"{_short(rest)}{_near(rest, [word for names in tables for word in names])}")
-    for kind, usage, said in explanations:
+    for one in explanations:
         state.say(
-            f"{usage}  ({kind})",
-            *textwrap.wrap(said, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
+            f"{one.usage}  ({one.kind}{', ' * bool(one.origin)}{one.origin})",
+            *textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
         )
 
 
@@ -295,7 +305,7 @@ def _until(letters: str, first: Completer, then: Completer = _none) -> Completer
 
 def _all_words(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
     for name in {*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS}:
-        yield Suggestion(name, next(said for _, _, said in explained(name)))
+        yield Suggestion(name, next(explained(name)).help)
 
 
 def hint(text: str, *, program: bool = False) -> str:
@@ -315,8 +325,8 @@ def hint(text: str, *, program: bool = False) -> str:
         found = list(explained(parts[index]))
         wanted = "command" if index == 0 and not program else "instruction"
         if found:
-            _, usage, said = next((one for one in found if one[0].startswith(wanted)), found[0])
-            return f"{usage}: {said}"
+            one = next((one for one in found if one.kind == wanted), found[0])
+            return f"{one.usage}: {one.help}"
     return ""
 
 

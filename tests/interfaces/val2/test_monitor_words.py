@@ -64,7 +64,7 @@ def test_an_instruction_or_an_assignment_at_the_prompt_says_what_to_type(sitting
 
 def test_every_word_can_be_explained(sitting):
     for name in COMMANDS:
-        assert next(commands.explained(name))[2]
+        assert next(commands.explained(name)).help
     assert "behind a location" in sitting.type("HELP APPRO")
     assert "DRY.RUN" in sitting.type("HELP dry")
     assert sitting.type("HELP xyzzy").startswith("*Unknown word*")
