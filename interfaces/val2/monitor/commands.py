@@ -70,6 +70,8 @@ class MonitorCommand:
     """Only while no program runs."""
     ours: bool = False
     """An extension, not VAL's."""
+    short: str = ""
+    """What stands for it though others begin with it too, between blanks."""
     more: bool = False
     """Something may follow its name though no form says what."""
 
@@ -133,9 +135,8 @@ def command_named(word: str) -> MonitorCommand | None:
 
 def _candidates(word: str) -> list[str]:
     wanted = word.upper()
-    if wanted in COMMANDS or wanted in SHORT:
-        return [SHORT.get(wanted, wanted)]
-    return begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
+    exact = [one.name for one in COMMANDS.values() if wanted in (one.name, *one.short.split())]
+    return exact or begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
 
 
 def _short(text: str) -> str:
@@ -340,7 +341,7 @@ _KINDS: Final = (
 """Of which there are some commands each: last letter, what they are about, a form, and what completes it."""
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "",
-                   "Stop the program and the arm, within its limits; Ctrl-C does the same."),
+                   "Stop the program and the arm, within its limits; Ctrl-C does the same.", short="A"),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
                    ours=True),
@@ -354,13 +355,14 @@ _TABLE: Final = (
     MonitorCommand("DISABLE", partial(running.turn, on=False), "switch,..", "Turn switches off.",
                    completes=_SWITCHES),
     MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
-                   completes=_instruction, idle=True),
+                   completes=_instruction, idle=True, short="D"),
     MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.",
                    completes=_programs, idle=True),
     MonitorCommand("ENABLE", partial(running.turn, on=True), "switch,..",
                    "Turn switches on; ENABLE POWER after PANIC.", completes=_SWITCHES),
     MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
-                   "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True),
+                   "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True,
+                   short="E EX"),
     MonitorCommand("EXIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
     MonitorCommand("FLIST", storage.flist, "", "List the files.", _LOOK),
     MonitorCommand("FREE", storage.free, "", "Show what is in memory.", _LOOK),
@@ -389,7 +391,7 @@ _TABLE: Final = (
                    "Define or change a location; then CR, or changes: ,,10",
                    completes=_until("=:", _LOCATIONS, _operands)),
     MonitorCommand("PROCEED", lambda s, _: s.controller.proceed(now=s.now), "",
-                   "Go on with a program that stands, at its next step.", idle=True),
+                   "Go on with a program that stands, at its next step.", idle=True, short="P"),
     MonitorCommand("QUIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
     MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", completes=_programs,
                    idle=True),
@@ -402,7 +404,8 @@ _TABLE: Final = (
                    _ARGUMENT, _operands),
     MonitorCommand("SPEED", running.speed, "| percent", "Show or set the monitor speed; it counts at once.",
                    _ARGUMENT, _operands),
-    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK),
+    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK,
+                   short="S"),
     MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
                    "Write programs, with all that they use, to a file.", completes=_STORED),
     MonitorCommand("SWITCH", running.switch, "| switch,..", "Show switches.", _LOOK, _SWITCHES),
@@ -415,7 +418,7 @@ _TABLE: Final = (
                    "Take back the newest motion, as far as it's still to come.", ours=True),
     MonitorCommand("WHERE", locations.where, "| 1 | REAL",
                    "Show where the arm is; 1 repeats until CR, REAL: the other twin.", _LOOK,
-                   lambda _state, _before: [Suggestion("REAL", "The other twin.")]),
+                   lambda _state, _before: [Suggestion("REAL", "The other twin.")], short="W"),
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
                    "Begin a program step by step, or do its next step.", completes=_programs, idle=True),
     MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
@@ -429,13 +432,3 @@ _TABLE: Final = (
 
 COMMANDS: Final = {row.name: row for row in sorted(_TABLE, key=lambda row: row.name)}
 """By name."""
-SHORT: Final = {
-    "A": "ABORT",
-    "D": "DO",
-    "E": "EXECUTE",
-    "EX": "EXECUTE",
-    "P": "PROCEED",
-    "S": "STATUS",
-    "W": "WHERE",
-}
-"""What stands for a command though others begin with it too."""

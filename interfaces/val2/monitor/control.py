@@ -145,8 +145,9 @@ class SharedController:
     def _withdraw(self, now: float) -> bool:
         """Take out of the plan what was asked for ahead; whether it's to be tried again."""
         person = self._person
-        shares = person is not None and person.holds
-        answer = self.control.request(person, now=now) if shares else ControlState.HELD
+        answer: ControlAnswer = ControlState.HELD
+        if person is not None and person.holds:
+            answer = self.control.request(person, now=now)
         if answer is ControlState.HELD and self.control.held:
             self.controller.arm.withdraw(now=now)
         return answer is ControlState.PENDING
