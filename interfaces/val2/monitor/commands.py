@@ -35,19 +35,25 @@ class Need(enum.Enum):
     """Control: it moves the arm, or changes what others see."""
 
 
-class Suggestion(NamedTuple):
-    """A word that may come."""
+class Word(NamedTuple):
+    """A word, as one of the things that it may be."""
 
     word: str
     help: str = ""
-    """One line; empty for none."""
+    """What it does, in one line; empty for none."""
+    kind: str = ""
+    """What it is; empty for a name."""
+    usage: str = ""
+    """How it's written."""
+    origin: str = ""
+    """Whose it is; empty where that isn't said."""
 
 
-Completer: TypeAlias = Callable[[TerminalState, str], Iterable[Suggestion]]
+Completer: TypeAlias = Callable[[TerminalState, str], Iterable[Word]]
 """Gives what may come behind a command's name, and what was typed between."""
 
 
-def _none(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+def _none(_state: TerminalState, _before: str) -> Iterable[Word]:
     return ()
 
 
@@ -148,66 +154,53 @@ def _near(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-class Explanation(NamedTuple):
-    """One of the things that a word is."""
-
-    kind: str
-    usage: str
-    """How it's written."""
-    help: str
-    """What it does."""
-    origin: str = ""
-    """Whose it is; empty where that isn't said."""
-
-
-def explained(word: str) -> Iterator[Explanation]:
+def explained(word: str) -> Iterator[Word]:
     """What a word is; it may be several things."""
     upper = word.upper()
     if upper in COMMANDS:
         one = COMMANDS[upper]
-        yield Explanation("command", " | ".join(one.usage), one.help, "ours" if one.ours else "")
-    for kind, table, names in (
-        ("instruction", forms.INSTRUCTIONS, (upper,)),
-        ("function", forms.FUNCTIONS, (upper, f"${upper}", f"#{upper}")),
-    ):
-        for form in (table[name] for name in names if name in table):
-            yield Explanation(kind, form.usage, form.help, form.origin)
+        yield Word(upper, one.help, "command", " | ".join(one.usage), "ours" if one.ours else "")
+    if upper in forms.INSTRUCTIONS:
+        form = forms.INSTRUCTIONS[upper]
+        yield Word(upper, form.help, "instruction", form.usage, form.origin)
+    for name in (upper, f"${upper}", f"#{upper}"):
+        if name in forms.FUNCTIONS:
+            form = forms.FUNCTIONS[name]
+            yield Word(name, form.help, "function", form.usage, form.origin)
     if upper in forms.SWITCHES:
         switch = forms.SWITCHES[upper]
-        yield Explanation("switch", f"ENABLE {upper} | DISABLE {upper}", switch.help, switch.origin)
+        yield Word(upper, switch.help, "switch", f"ENABLE {upper} | DISABLE {upper}", switch.origin)
     if upper in forms.PARAMETERS:
         row = forms.PARAMETERS[upper]
         said = f"{row.help} {layout.number(row.low)} to {layout.number(row.high)} {row.unit}."
-        yield Explanation("parameter", f"PARAMETER {upper} = value", said, row.origin)
+        yield Word(upper, said, "parameter", f"PARAMETER {upper} = value", row.origin)
     for kind, words in (("operator", forms.OPERATORS), ("word", forms.WORDS)):
         if upper in words:
-            yield Explanation(kind, upper, words[upper])
+            yield Word(upper, words[upper], kind, upper)
     if upper in forms.IGNORED and upper not in COMMANDS:
         why = forms.UNAVAILABLE.get(upper)
         passed = "It's recognised in programs, and passed over: it has no meaning here."
-        yield Explanation("instruction", upper, passed if why is None else f"It isn't available: {why}.", "V+")
+        yield Word(upper, passed if why is None else f"It isn't available: {why}.", "instruction", upper, "V+")
 
 
 def help_(state: TerminalState, rest: str) -> None:
     """HELP; HELP word."""
     if not rest:
-        state.say("Commands; they may be abbreviated. HELP and a word says more of it.")
-        state.say(*layout.in_columns(COMMANDS))
-        state.say("Instructions, after DO or in programs:")
-        state.say(*layout.in_columns(forms.INSTRUCTIONS))
-        state.say("Functions:")
-        state.say(*layout.in_columns(forms.FUNCTIONS))
+        state.say(
+            "Commands; they may be abbreviated. HELP and a word says more of it.", *layout.in_columns(COMMANDS)
+        )
+        state.say("Instructions, after DO or in programs:", *layout.in_columns(forms.INSTRUCTIONS))
+        state.say("Functions:", *layout.in_columns(forms.FUNCTIONS))
         return
     tables = (COMMANDS, forms.INSTRUCTIONS, forms.FUNCTIONS, forms.SWITCHES, forms.PARAMETERS)
-    whole = next((found[0] for names in tables if len(found := begun(rest.upper(), names)) == 1), rest)
-    explanations = list(explained(rest)) or list(explained(whole))
-    if not explanations:
+    whole = next((some[0] for names in tables if len(some := begun(rest.upper(), names)) == 1), rest)
+    found = list(explained(rest)) or list(explained(whole))
+    if not found:
         raise ValError("Unknown word", f"{_short(rest)}{_near(rest, [word for names in tables for word in names])}")
-    for one in explanations:
-        state.say(
-            f"{one.usage}  ({one.kind}{', ' * bool(one.origin)}{one.origin})",
-            *textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
-        )
+    for one in found:
+        kind = f"{one.kind}, {one.origin}" if one.origin else one.kind
+        said = textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    ")
+        state.say(f"{one.usage}  ({kind})", *said)
 
 
 MOST: Final = 200
@@ -217,7 +210,7 @@ _DO: Final = re.compile(r"\sDO\s(.*)$", re.IGNORECASE | re.DOTALL)
 _LABEL: Final = re.compile(r"\s*\d+\s+")
 
 
-def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
+def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Word]]:
     """What may complete a line.
 
     Args:
@@ -245,10 +238,10 @@ def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tu
     fitting = {one.word: one for one in known if one.word.upper().startswith(wanted) and one.word.upper() != wanted}
     lower = bool(fragment) and not any(letter.isupper() for letter in fragment)
     some = sorted(fitting.values(), key=lambda one: one.word.upper())[:MOST]
-    return fragment, [Suggestion(one.word.lower() if lower else one.word, one.help) for one in some]
+    return fragment, [one._replace(word=one.word.lower()) if lower else one for one in some]
 
 
-def _instruction(state: TerminalState, before: str) -> Iterator[Suggestion]:
+def _instruction(state: TerminalState, before: str) -> Iterator[Word]:
     word, _ = split_word(_LABEL.sub("", before))
     keyword = word.upper()
     if not word:
@@ -261,40 +254,39 @@ def _instruction(state: TerminalState, before: str) -> Iterator[Suggestion]:
             yield from _programs(state, before)
         if keyword in forms.INSTRUCTIONS:
             allowed = forms.INSTRUCTIONS[keyword].allowed_words
-            yield from (Suggestion(one, forms.WORDS.get(one, "")) for one in allowed)
+            yield from (Word(one, forms.WORDS.get(one, "")) for one in allowed)
         yield from _operands(state, before)
 
 
-def _motion(state: TerminalState, before: str) -> Iterable[Suggestion]:
+def _motion(state: TerminalState, before: str) -> Iterable[Word]:
     found = _DO.search(before)
-    return _instruction(state, found[1]) if found else [Suggestion("DO")]
+    return _instruction(state, found[1]) if found else [Word("DO")]
 
 
-def _operands(state: TerminalState, before: str) -> Iterator[Suggestion]:
-    yield from (Suggestion(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
-    yield from (Suggestion(name, said) for name, said in forms.OPERATORS.items())
+def _operands(state: TerminalState, before: str) -> Iterator[Word]:
+    yield from (Word(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
+    yield from (Word(name, said) for name, said in forms.OPERATORS.items())
     yield from _names("location", "point", "real", "string")(state, before)
 
 
-def _programs(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-    return [Suggestion(one) for one in state.controller.memory.programs]
+def _programs(state: TerminalState, _before: str) -> Iterable[Word]:
+    return [Word(one) for one in state.controller.memory.programs]
 
 
-def _files(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-    return [Suggestion(one) for one in state.files.listed()]
+def _files(state: TerminalState, _before: str) -> Iterable[Word]:
+    return [Word(one) for one in state.files.listed()]
 
 
 def _rows(table: Mapping[str, MonitorCommand | forms.Form | forms.Switch | forms.Parameter]) -> Completer:
-    return lambda _state, _before: [Suggestion(one.name, one.help) for one in table.values()]
+    return lambda _state, _before: [Word(one.name, one.help) for one in table.values()]
 
 
 def _names(*kinds: str) -> Completer:
     """Names in memory, an array's once."""
 
-    def completes(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-        listing = state.controller.memory.listing
-        found = {name.partition("[")[0]: None for kind in kinds for name, _ in listing(kind)}
-        return [Suggestion(name) for name in found]
+    def completes(state: TerminalState, _before: str) -> Iterable[Word]:
+        listed = [name for kind in kinds for name, _ in state.controller.memory.listing(kind)]
+        return map(Word, dict.fromkeys(name.partition("[")[0] for name in listed))
 
     return completes
 
@@ -304,9 +296,9 @@ def _until(letters: str, first: Completer, then: Completer = _none) -> Completer
     return lambda state, before: (then if set(letters) & set(before) else first)(state, before)
 
 
-def _all_words(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+def _all_words(_state: TerminalState, _before: str) -> Iterable[Word]:
     for name in {*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS}:
-        yield Suggestion(name, next(explained(name)).help)
+        yield next(explained(name))
 
 
 def hint(text: str, *, program: bool = False) -> str:
@@ -418,7 +410,7 @@ _TABLE: Final = (
                    "Take back the newest motion, as far as it's still to come.", ours=True),
     MonitorCommand("WHERE", locations.where, "| 1 | REAL",
                    "Show where the arm is; 1 repeats until CR, REAL: the other twin.", _LOOK,
-                   lambda _state, _before: [Suggestion("REAL", "The other twin.")], short="W"),
+                   lambda _state, _before: [Word("REAL", "The other twin.")], short="W"),
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
                    "Begin a program step by step, or do its next step.", completes=_programs, idle=True),
     MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),

@@ -87,7 +87,7 @@ class TerminalMonitor:
             return Expects.ANSWER
         return Expects.COMMAND if self._dialogue is None else self._asked.expects
 
-    def suggestions(self, text: str) -> tuple[str, list[commands.Suggestion]]:
+    def suggestions(self, text: str) -> tuple[str, list[commands.Word]]:
         """What may complete the next line, as far as the cursor; see `commands.suggestions`."""
         fragment, found = commands.suggestions(text, self.state, program=self.expects is Expects.STEP)
         return fragment, [] if self.expects is Expects.ANSWER else found
