@@ -141,8 +141,9 @@ def command_named(word: str) -> MonitorCommand | None:
 
 def _candidates(word: str) -> list[str]:
     wanted = word.upper()
-    exact = [one.name for one in COMMANDS.values() if wanted in (one.name, *one.short.split())]
-    return exact or begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
+    if wanted in _EXACT:
+        return [_EXACT[wanted]]
+    return begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
 
 
 def _short(text: str) -> str:
@@ -424,3 +425,4 @@ _TABLE: Final = (
 
 COMMANDS: Final = {row.name: row for row in sorted(_TABLE, key=lambda row: row.name)}
 """By name."""
+_EXACT: Final = {word: row.name for row in _TABLE for word in (row.name, *row.short.split())}

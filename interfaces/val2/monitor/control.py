@@ -117,7 +117,7 @@ class SharedController:
             now: Session time [s].
         """
         self._notice(now)
-        if self.holder is not None and self.holder != terminal:
+        if self.holder is not None and self.holder is not terminal:
             if self.control.held:
                 return "another terminal is in control"
             if self._runs:
@@ -154,7 +154,7 @@ class SharedController:
 
     def leave(self, terminal: Listener, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""
-        if self.holder == terminal:
+        if self.holder is terminal:
             self.holder = None
             if self._runs:
                 self.controller.abort(now=now)

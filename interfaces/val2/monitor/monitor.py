@@ -53,6 +53,7 @@ class TerminalMonitor:
         """
         self._person = person
         self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
+        self._listener = self.take
         self.state = TerminalState(shared.controller, shared.control, files, version)
         self._dialogue: Dialogue | None = None
         self._asked = Question()
@@ -94,7 +95,7 @@ class TerminalMonitor:
 
     @property
     def _in_control(self) -> bool:
-        return self._shared.holder == self.take
+        return self._shared.holder is self._listener
 
     @property
     def _runs(self) -> bool:
@@ -208,7 +209,7 @@ class TerminalMonitor:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
             if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
                 self._control_due, self._pending = self.state.now + CONTROL_POLL, (command.name, text)
@@ -257,7 +258,7 @@ class TerminalMonitor:
         self.state.drop_work()
         self.done = True
         self._waiting.clear()
-        self._shared.leave(self.take, now=self.state.now)
+        self._shared.leave(self._listener, now=self.state.now)
 
     def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
@@ -306,7 +307,7 @@ class TerminalMonitor:
 
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
         if answer is ControlState.PENDING:
             self._control_due = self.state.now + CONTROL_POLL
             return
