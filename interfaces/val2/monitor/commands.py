@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import ValError
@@ -278,7 +278,8 @@ def _files(state: TerminalState, _before: str) -> Iterable[Word]:
     return [Word(one) for one in state.files.listed()]
 
 
-def _rows(table: Mapping[str, MonitorCommand | forms.Form | forms.Switch | forms.Parameter]) -> Completer:
+def _rows(table: Mapping[str, Any]) -> Completer:
+    """The names of a table's rows, with their help."""
     return lambda _state, _before: [Word(one.name, one.help) for one in table.values()]
 
 
