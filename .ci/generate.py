@@ -381,7 +381,9 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (commands|fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(
+    r"<!-- (commands|fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S
+)
 Names = dict[str, str]
 """What a document calls what has a table of its own there, by the name of its class."""
 

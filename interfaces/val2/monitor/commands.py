@@ -279,7 +279,7 @@ def _files(state: TerminalState, _before: str) -> Iterable[Word]:
     return [Word(one) for one in state.files.listed()]
 
 
-def _rows(table: Mapping[str, Form | Setting]) -> Completer:
+def _rows(table: Mapping[str, Form | Setting | MonitorCommand]) -> Completer:
     """The names of a table's rows, with their help."""
     return lambda _state, _before: [Word(one.name, one.help) for one in table.values()]
 
