@@ -1,4 +1,4 @@
-"""Who carries jobs out at a robot's site, and those that do without a loudspeaker and a screen."""
+"""Who carries jobs out at a robot's site, and one that does without a loudspeaker."""
 
 from __future__ import annotations
 
@@ -29,13 +29,6 @@ class Speaker(Protocol):
 
     def is_speaking(self, *, now: float) -> bool:
         """Whether what was begun isn't over yet."""
-
-
-class Screen(Protocol):
-    """Whatever shows a text."""
-
-    def show(self, text: str) -> None:
-        """Show a text in place of any other; an empty one clears it."""
 
 
 class ArmControl(Protocol):
@@ -73,31 +66,3 @@ class SilentSpeaker(Speaker):
         if now >= self._until:
             self.text = ""
         return now < self._until
-
-
-class TextScreen(Screen):
-    """Keeps what is shown, for others to read."""
-
-    def __init__(self) -> None:
-        """Show nothing."""
-        self.text = ""
-
-    @override
-    def show(self, text: str) -> None:
-        self.text = text
-
-
-class NoArm(ArmControl):
-    """There's no arm here."""
-
-    @override
-    def run(self, program: str, source: str, *, now: float) -> str:
-        return "there's no arm here that could carry out a program"
-
-    @override
-    def end(self, *, now: float) -> None:
-        pass
-
-    @override
-    def outcome(self, *, now: float) -> str | None:
-        return ""

@@ -31,41 +31,8 @@ from vrs.checks import finite, validated, within
 
 
 @dataclass(frozen=True, slots=True)
-class OperatorLost:
-    """Nobody is heard any more who could stop the robot: the policy says what follows."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Interrupted:
-    """The robot has to stop, whatever the policy: it touches something, or is told to."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Done:
-    """What was asked for has been done."""
-
-    attempt: int
-
-
-@dataclass(frozen=True, slots=True)
-class JobFailed:
-    """What was asked for can't be done."""
-
-    attempt: int
-    reason: str
-
-
-Input: TypeAlias = ListCommand | OperatorLost | Interrupted | Done | JobFailed
-"""What a runner is told."""
-
-
-@dataclass(frozen=True, slots=True)
 class CarryOut:
-    """Do a job; answer with `Done` or `JobFailed`."""
+    """Do a job; answer when it's done, or can't be."""
 
     attempt: int
     job: MoveJob | VoiceJob | ArmJob
@@ -157,7 +124,8 @@ class JobRunner:
             config: How to behave.
         """
         self.jobs = JobList() if jobs is None else jobs
-        self._config = RunnerConfig() if config is None else config
+        self.config = RunnerConfig() if config is None else config
+        """How it behaves."""
         self.progress = Progress.of(self.jobs)
         """How far it is."""
         self._requests: list[Request] = []
@@ -175,11 +143,6 @@ class JobRunner:
         return runner
 
     @property
-    def config(self) -> RunnerConfig:
-        """How it behaves."""
-        return self._config
-
-    @property
     def running(self) -> bool:
         """Whether the list is being done."""
         return self.progress.stage is JobStage.RUNNING
@@ -190,28 +153,38 @@ class JobRunner:
         wait = self._waiting()
         return wait is not None and wait.seconds is None
 
-    def receive(self, message: Input, *, now: float) -> str:
-        """Take in what a person asks for, or what became of a request.
+    def receive(self, command: ListCommand, *, now: float) -> str:
+        """Take in what a person asks for at a time [s]; why it isn't done, empty if it is."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        return self._commanded(command, now)
+
+    def answer(self, attempt: int, failure: str | None = None, *, now: float) -> None:
+        """Take in what became of a request; of an attempt that's over it counts for nothing.
 
         Args:
-            message: That.
+            attempt: Its number.
+            failure: Why it can't be done; None if it has been.
             now: [s].
-
-        Returns:
-            Why it isn't done; empty if it is. An answer to an attempt that's over counts for nothing.
         """
         self._catch_up(finite("now", now, "finite seconds"))
-        match message:
-            case ListCommand():
-                return self._commanded(message, now)
-            case Done() | JobFailed():
-                self._answered(message, now)
-            case OperatorLost(reason):
-                if self._config.loss is OperatorLoss.STOP:
-                    self._pause(reason, now)
-            case Interrupted(reason):
-                self._pause(reason, now)
-        return ""
+        if not self._open or attempt != self._attempt:
+            return
+        self._open, self._due = False, math.inf
+        if failure is None:
+            self._finish(now)
+        else:
+            self._stage_of_running(JobStage.FAILED, failure)
+
+    def interrupt(self, reason: str, *, now: float) -> None:
+        """Pause: the robot has to stop, whatever the policy, as it touches something, or is told to."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        self._pause(reason, now)
+
+    def lose_operator(self, reason: str, *, now: float) -> None:
+        """Follow the policy: nobody is heard any more who could stop the robot."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        if self.config.loss is OperatorLoss.STOP:
+            self._pause(reason, now)
 
     def load(self, jobs: JobList, progress: Progress | None = None, *, now: float) -> str:
         """Take a list in place of the one before.
@@ -304,15 +277,6 @@ class JobRunner:
             self._requests.append(EndJob(self._attempt))
         self._open, self._due = False, math.inf
 
-    def _answered(self, answer: Done | JobFailed, now: float) -> None:
-        if not self._open or answer.attempt != self._attempt:
-            return
-        self._open, self._due = False, math.inf
-        if isinstance(answer, Done):
-            self._finish(now)
-        else:
-            self._stage_of_running(JobStage.FAILED, answer.reason)
-
     def _finish(self, now: float) -> None:
         """The running job is done: on to the next."""
         job = self.progress.running
@@ -337,7 +301,7 @@ class JobRunner:
 
     def _ask(self, job: MoveJob | VoiceJob | WaitJob | ArmJob, before: JobProgress, now: float) -> None:
         """Let a job be carried out."""
-        config = self._config
+        config = self.config
         if isinstance(job, WaitJob):
             seconds = job.seconds if before.left is None else before.left
             self._due = math.inf if seconds is None else now + seconds

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Request, Show, SilentSpeaker
+from interfaces.jobs import CarryOut, EndJob, JobRunner, Request, Show, SilentSpeaker
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
@@ -182,10 +182,10 @@ class ScenarioRun:
             attempt, self._moving = self._moving, 0
             arrived = journey.state is JourneyState.ARRIVED
             self._stops.append(self._stop(journey.goal))
-            self._runner.receive(Done(attempt) if arrived else JobFailed(attempt, journey.reason), now=now)
+            self._runner.answer(attempt, None if arrived else journey.reason, now=now)
         if self._speaking and not self._speaker.is_speaking(now=now):
             attempt, self._speaking = self._speaking, 0
-            self._runner.receive(Done(attempt), now=now)
+            self._runner.answer(attempt, now=now)
 
     def _carry_out(self, request: Request, now: float) -> None:
         match request:
@@ -205,7 +205,7 @@ class ScenarioRun:
                 self._pilot.journey.end()
                 self._moving = self._speaking = 0
             case CarryOut(attempt):
-                self._runner.receive(JobFailed(attempt, "there's no arm"), now=now)
+                self._runner.answer(attempt, "there's no arm", now=now)
 
     def _stop(self, goal: Goal | None) -> ScenarioStop:
         assert goal is not None
