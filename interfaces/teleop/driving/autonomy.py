@@ -13,9 +13,18 @@ from typing import Protocol
 import numpy as np
 from typing_extensions import override
 
-from interfaces.jobs.devices import ArmControl, SilentSpeaker, Speaker
 from interfaces.jobs.file import digest
-from interfaces.jobs.runner import CarryOut, EndJob, JobRunner, Request, RunnerConfig, Show
+from interfaces.jobs.runner import (
+    ArmControl,
+    CarryOut,
+    EndJob,
+    JobRunner,
+    Request,
+    RunnerConfig,
+    Show,
+    SilentSpeaker,
+    Speaker,
+)
 from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
 from interfaces.messages.fields import MOST_POINTS
 from interfaces.messages.jobs import ArmJob, ListCommand, MoveJob, OperatorLoss, VoiceJob
