@@ -32,7 +32,7 @@ from interfaces.messages.segments import MOST_POWERS, placed, written
 from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
-from vrs.ledger import Known, Receipt
+from vrs.ledger import LedgerEntry, Receipt
 from vrs.mobile import Grid
 from vrs.model import Array
 from vrs.notes import rough_in
@@ -325,7 +325,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
     """Whether it moves the arm with bounded jerk."""
 
     @property
-    def known(self) -> Known:
+    def known(self) -> LedgerEntry:
         """What an engine that goes on from here is told.
 
         Raises:
@@ -335,7 +335,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         if command is not None and not isinstance(command, MotionCommand):
             raise InvalidValueError("command", command, "a motion command")
         profile = Profile.JERK_LIMITED if self.smooth else Profile.PARABOLIC
-        return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
+        return LedgerEntry(self.receipt, command, rough_in(self.receipt.reason), profile=profile)
 
 
 UNSAID = -math.inf
