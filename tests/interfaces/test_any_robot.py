@@ -171,7 +171,10 @@ def test_arms_have_any_number_of_joints(n: int, tmp_path: Path) -> None:
         assert recording.real(2.0).shape == (n,)
 
 
-@pytest.mark.parametrize("arguments", [("compare",), ("replay", "--commands"), ("export", "--report", "r.html")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("compare",), ("compare", "--robot", "puma560"), ("replay", "--commands"), ("export", "--report", "r.html")],
+)
 def test_without_the_robot_its_recording_says_what_is_missing(
     demo: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
