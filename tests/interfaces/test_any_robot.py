@@ -171,7 +171,10 @@ def test_arms_have_any_number_of_joints(n: int, tmp_path: Path) -> None:
         assert recording.real(2.0).shape == (n,)
 
 
-@pytest.mark.parametrize("arguments", [("compare",), ("replay", "--commands"), ("export", "--report", "r.html")])
+@pytest.mark.parametrize(
+    "arguments",
+    [("compare",), ("compare", "--robot", "puma560"), ("replay", "--commands"), ("export", "--report", "r.html")],
+)
 def test_without_the_robot_its_recording_says_what_is_missing(
     demo: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -226,6 +229,7 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
         (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
         (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
         (("console", "--robot", ARM), "an arm of 6 joints that turn"),
+        (("serve", "--robot", "micro", "--camera", "3"), "micro has nothing of the kind"),
         (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
         (("lab", "--robot", ARM, "--out", "."), "a mobile robot; this one is an arm"),
         (("demo", "--robot", "tests.interfaces.own_arm:Crane"), "a Robot there (ROBOT)"),
