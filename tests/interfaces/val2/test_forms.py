@@ -8,6 +8,7 @@ import pytest
 
 from interfaces.val2 import expressions, forms
 from interfaces.val2.errors import ValError
+from interfaces.val2.functions import OPERATORS
 from interfaces.val2.parser import parse_expression, parse_line
 
 REFERENCE = (Path(__file__).parents[3] / "docs" / "val2.md").read_text()
@@ -37,7 +38,9 @@ def test_the_reference_has_switches_parameters_and_what_is_passed_over():
 def test_no_word_is_two_things():
     assert not forms.IGNORED & forms.INSTRUCTIONS.keys()
     assert not forms.OPERATORS.keys() & forms.FUNCTIONS.keys()
-    assert forms.OPERATORS.keys() - {"NOT", "COM"} <= forms.LEVELS.keys()
+    assert forms.OPERATORS.keys() - {"NOT", "COM"} <= {
+        row.name for row in OPERATORS.values() if len(row.slots) == 2
+    }
     assert set(forms.ALIASES.values()) <= forms.FUNCTIONS.keys()
 
 

@@ -7,7 +7,7 @@ import string
 from hypothesis import strategies as st
 
 from interfaces.val2 import forms
-from interfaces.val2.functions import row_of
+from interfaces.val2.functions import OPERATORS, row_of
 from interfaces.val2.parser import LONGEST_LINE
 from interfaces.val2.printer import print_step
 from interfaces.val2.syntax import (
@@ -42,7 +42,7 @@ formats = st.builds(
     st.none() | st.integers(0, 999),
     st.none() | st.integers(0, 99),
 )
-OPERATORS = sorted(forms.LEVELS)
+BETWEEN_TWO = sorted(name for name, row in OPERATORS.items() if len(row.slots) == 2)
 
 
 def variables(inner, named=names):
@@ -79,7 +79,7 @@ def larger(inner):
     loose = inner.filter(lambda e: not isinstance(e, Compound))
     return (
         st.builds(Apply, st.sampled_from(["-", "NOT", "COM"]), st.tuples(inner))
-        | st.builds(Apply, st.sampled_from(OPERATORS), st.tuples(inner, inner))
+        | st.builds(Apply, st.sampled_from(BETWEEN_TWO), st.tuples(inner, inner))
         | st.builds(Compound, st.lists(loose, min_size=2, max_size=4).map(tuple))
         | variables(inner)
         | applications(inner)
