@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Claim, Figure, Study
+from interfaces.lab.claims import Claim, Figure, Measured, Study
 from interfaces.lab.doulgeri import (
     agreement,
     causality,
@@ -40,6 +40,12 @@ def only(claims: Iterable[Claim], *said: str) -> None:
     found = failed(claims)
     assert len(found) == len(said), found
     assert all(any(word in claim for claim in found) for word in said), found
+
+
+def but(seen: Measured, **changes: Any) -> Measured:
+    """The same, with other figures."""
+    assert changes.keys() <= vars(seen).keys()
+    return Measured(**vars(seen) | changes)
 
 
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
@@ -203,6 +209,9 @@ def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
 
 
+SPLICED = Measured(position_jump=0.0, velocity_jump=0.0, tails=5, changed=0, uneven=0.0, past=0.0)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -215,7 +224,7 @@ def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     ],
 )
 def test_segments(changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = segments.Spliced(0.0, 0.0, 5, 0, 0.0, 0.0)._replace(**changes)
+    seen = but(SPLICED, **changes)
     monkeypatch.setattr(segments, "splice", lambda _: seen)
     only(segments.work(STUDY, "").claims, *said)
 
