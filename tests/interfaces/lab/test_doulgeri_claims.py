@@ -49,7 +49,9 @@ def but(seen: Measured, **changes: Any) -> Measured:
 
 
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
-PREDICTED = delays.DelayResult((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SHARE)
+PREDICTED = Measured(
+    lateness=(0.0, 0.0), postponed=0.0, ages=(0.0, 0.0, 0.0), shown=0.02, falsified=SHARE, foretold=SHARE
+)
 
 
 @pytest.mark.parametrize(
@@ -66,14 +68,14 @@ PREDICTED = delays.DelayResult((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SH
 )
 def test_delays_of_predicted_frames(changes: dict[str, Any], said: list[str]) -> None:
     setting = delays.SETTINGS["-Df, predicted"]
-    only(delays.delay_claims(STUDY, setting, [PREDICTED._replace(**changes)] * 2), *said)
+    only(delays.delay_claims(STUDY, setting, [but(PREDICTED, **changes)] * 2), *said)
 
 
 def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
     setting = delays.SETTINGS["-Df"]
-    seen = PREDICTED._replace(ages=(0.5, 0.5, 0.5), falsified=0.0)
+    seen = but(PREDICTED, ages=(0.5, 0.5, 0.5), falsified=0.0)
     only(delays.delay_claims(STUDY, setting, [seen] * 2))
-    only(delays.delay_claims(STUDY, setting, [seen, seen._replace(falsified=0.01)]), "none being predicted")
+    only(delays.delay_claims(STUDY, setting, [seen, but(seen, falsified=0.01)]), "none being predicted")
     shares = np.tile(-np.expm1(-0.8 * np.array(delays.LEADS)), (3, 1))
     only(delays.lead_claims(STUDY, shares))
     only(delays.lead_claims(STUDY, 0.85 * shares), "0.1 s", "0.5 s", "1 s")
