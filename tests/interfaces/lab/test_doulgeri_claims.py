@@ -82,9 +82,10 @@ def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
 
 
 NOWHERE = np.zeros((1, 3))
-HAND = dragging.DraggingResult(
-    0.005, 0.02, 0.05, 0.0, 1.0, 0, 200, 5e-4, 0.3, np.zeros(1), NOWHERE, NOWHERE, NOWHERE
-)
+HAND = Measured(
+    following=0.005, largest=0.02, lag=0.05, answered=0.0, limits=1.0, rejected=0, inputs=200, real=5e-4,
+    real_lag=0.3, t=np.zeros(1), hand=NOWHERE, virtual=NOWHERE, robot=NOWHERE,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -102,7 +103,7 @@ HAND = dragging.DraggingResult(
 def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
     only(dragging.conclude(STUDY, (HAND, HAND, None, None)).claims)
     # One hand of two: of the interval's end a quarter of the resamples are that one alone.
-    only(dragging.conclude(STUDY, (HAND, HAND._replace(**changes), None, None)).claims, *said)
+    only(dragging.conclude(STUDY, (HAND, but(HAND, **changes), None, None)).claims, *said)
 
 
 def test_encoding() -> None:
@@ -187,8 +188,11 @@ def test_the_fixed_offset_hides_what_95_percent_of_the_packets_take(monkeypatch:
     assert given == [None, -quantile] * 2
 
 
-AGREED = agreement.AgreementResult(1.0, 0.3, (0.1,), (0.5,), 0.1, 1.0, np.zeros(1), np.zeros(1))
-QUIET = AGREED._replace(corrections=(), durations=())
+AGREED = Measured(
+    agreed=1.0, noticed=0.3, corrections=(0.1,), durations=(0.5,), unlinked=0.1, limits=1.0, t=np.zeros(1),
+    apart=np.zeros(1),
+)  # fmt: skip
+QUIET = but(AGREED, corrections=(), durations=())
 
 
 @pytest.mark.parametrize(
@@ -206,7 +210,7 @@ QUIET = AGREED._replace(corrections=(), durations=())
 )
 def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     good = {"late": AGREED, "blocked": AGREED, "lossless": QUIET, "lossy": QUIET}
-    bad = good | {case: good[case]._replace(**changes)}
+    bad = good | {case: but(good[case], **changes)}
     only(agreement.conclude(STUDY, tuple([seen] * 2 for seen in good.values())).claims)
     only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
 
@@ -240,9 +244,10 @@ def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
     only(causality.work(STUDY, "").claims, "D = 0: postponed")
 
 
-SCRUBBED = interactivity.Scrubbed(
-    {ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, 0.0, (8.0, 1.5, 1.5), 0.0, (0.0,), (0.0,)
-)
+SCRUBBED = Measured(
+    seek={ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, dragged=0.0, live=(8.0, 1.5, 1.5), others=0.0, t=(0.0,),
+    place=(0.0,),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -262,5 +267,5 @@ def test_interactivity(
     edit: dict[str, float], changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interactivity, "edits", lambda _: dict.fromkeys(interactivity.EDITS, 0.25) | edit)
-    monkeypatch.setattr(interactivity, "scrub", lambda _: SCRUBBED._replace(**changes))
+    monkeypatch.setattr(interactivity, "scrub", lambda _: but(SCRUBBED, **changes))
     only(interactivity.work(STUDY, "").claims, *said)
