@@ -95,9 +95,9 @@ def run(setting: OffsetSetting, seed: int, length: float) -> Measured:
         shown=max(shown.age for shown in viewer.history),  # largest age of a frame when it was shown [s]
         falsified=float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts])),  # share
         foretold=foretold(busy, began),  # share of the frames in whose lead a command was carried out
-        # For the timing diagrams: the users' time when a command was issued, the engine's when it came [s];
+        # For the timing diagrams: the users' time when a command was issued, the engine's when it came [s].
         commands=tuple(zip(issued.tolist(), made, strict=True)),
-        # the engine's time when a frame was made, the time it shows, and the users' when it came [s].
+        # And the engine's time when a frame was made, the time it shows, and the users' when it came [s].
         frames=tuple((frame.made_at, frame.t, at) for frame, at in log.frames),
     )
 

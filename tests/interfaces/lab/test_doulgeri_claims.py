@@ -107,28 +107,31 @@ def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
 
 
 def test_encoding() -> None:
-    good = encoding.Sizes(120.0, 60.0, 100.0, 100.0, 1e-3, 0.0, 100.0, 300.0, 200.0, 1e-5)
+    good = Measured(
+        frames=120.0, frames_single=60.0, segments=100.0, commands=100.0, between=1e-3, rebuilt=0.0, compact=100.0,
+        compact_each=300.0, absolute=200.0, compact_error=1e-5,
+    )  # fmt: skip
     only(encoding.conclude(STUDY, ([good] * 2,) * 3).claims)
     # One of the two is enough.
-    for other in (good._replace(segments=115.0), good._replace(compact=115.0)):
+    for other in (but(good, segments=115.0), but(good, compact=115.0)):
         only(encoding.conclude(STUDY, ([good] * 2, [good, other], [good] * 2)).claims)
-    both = good._replace(segments=115.0, compact=115.0)
+    both = but(good, segments=115.0, compact=115.0)
     only(encoding.conclude(STUDY, ([good] * 2, [good, both], [good] * 2)).claims, "the better of segments and")
-    dear = good._replace(frames=1000.0, segments=500.0, compact=435.0)
+    dear = but(good, frames=1000.0, segments=500.0, compact=435.0)
     only(
         encoding.conclude(STUDY, ([good] * 2, [good, dear], [good] * 2)).claims,
         "rates by hand, 50 inputs a second: the",
     )
     only(
-        encoding.conclude(STUDY, ([good, good._replace(rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
+        encoding.conclude(STUDY, ([good, but(good, rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
         "who has the segments",
     )
     only(
-        encoding.conclude(STUDY, ([good, good._replace(compact_error=1.1e-5)], [good] * 2, [good] * 2)).claims,
+        encoding.conclude(STUDY, ([good, but(good, compact_error=1.1e-5)], [good] * 2, [good] * 2)).claims,
         "who gets compact frames",
     )
     said = encoding.conclude(
-        STUDY, ([good, good._replace(commands=119.0)], [good] * 2, [good._replace(commands=140.0)] * 2)
+        STUDY, ([good, but(good, commands=119.0)], [good] * 2, [but(good, commands=140.0)] * 2)
     )
     only(said.claims, "a move every 2 s: bytes", "twist by hand, 50 inputs a second: bytes")
 
@@ -141,8 +144,11 @@ def test_the_readers_of_an_encoding_have_the_motion() -> None:
     assert found.compact < found.compact_each < found.frames < found.segments
 
 
-RUN = jitter.JitterResult(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)
-FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
+RUN = Measured(
+    mean=0.001, p95=0.002, largest=0.004, time_difference=1.0, time_difference_max=2.0, progress=1.0, aside=0.0,
+    bursts=0, limits=1.0, pace=1.05, postponed=0, moves=10, corrections=0,
+)  # fmt: skip
+FIXED = but(RUN, mean=0.02, time_difference=3.0, postponed=1)
 
 
 @pytest.mark.parametrize(
@@ -159,16 +165,16 @@ FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
     ],
 )
 def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
-    def claims(*adaptive: jitter.JitterResult) -> Sequence[Claim]:
-        result: Any = jitter.Result(-2.0, adaptive, (FIXED,) * 2, ())  # type: ignore[arg-type]
+    def claims(*adaptive: Measured) -> Sequence[Claim]:
+        result = Measured(D=-2.0, adaptive=adaptive, fixed=[FIXED] * 2, traces=())
         return jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims
 
     only(claims(RUN, RUN))
-    only(claims(RUN, RUN._replace(**changes)), *said)
+    only(claims(RUN, but(RUN, **changes)), *said)
 
 
 def test_a_fixed_offset_that_postpones_nothing_is_said_so() -> None:
-    result: Any = jitter.Result(-2.0, (RUN,) * 2, (FIXED._replace(postponed=0),) * 2, ())  # type: ignore[arg-type]
+    result = Measured(D=-2.0, adaptive=[RUN] * 2, fixed=[but(FIXED, postponed=0)] * 2, traces=())
     only(jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims, "a fixed D postpones")
 
 
