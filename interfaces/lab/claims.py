@@ -116,8 +116,8 @@ def _number(bar: float) -> str:
     return f"{bar:g}".replace("e-0", "e-")
 
 
-class Measured(SimpleNamespace):
-    """What a run measured, by name; whoever makes one says what each figure is."""
+class Results(SimpleNamespace):
+    """What was measured, by name; whoever makes one says beside each figure what it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +137,13 @@ class Table:
 
     @classmethod
     def of(cls, name: str, title: str, rows: Iterable[Sequence[tuple[str, Cell]]]) -> Table:
-        """A table of rows, one at least, whose cells say which column they're in; all name the same."""
+        """A table of rows whose cells say which column they're in.
+
+        Raises:
+            ValueError: If rows name other columns than the others do, or there are none.
+        """
         named = tuple(rows)
-        columns = tuple(column for column, _ in named[0])
+        (columns,) = {tuple(column for column, _ in row) for row in named}
         return cls(name, title, columns, tuple(tuple(cell for _, cell in row) for row in named))
 
 

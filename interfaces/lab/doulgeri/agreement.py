@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Measured, Study, Table, above, at_most, none_of
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table, above, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, interval_name, median
@@ -60,7 +60,7 @@ def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
     return float(agreed), np.array(t), np.array(gaps)
 
 
-def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Measured:
+def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Results:
     """What is seen from some time on; `unlinked` is the virtual robot's timeline where nothing comes back."""
     agreed, t, gaps = _watch(lab, since)
     made: list[Correction] = lab.operator.corrections
@@ -71,7 +71,7 @@ def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Measured:
         np.abs(timeline.sample(grid, derivative=k) / top).max()
         for k, top in ((1, limits.qd_max), (2, limits.qdd_max))
     ]
-    return Measured(
+    return Results(
         agreed=agreed,  # until the timelines agree for good [s]; infinite where they don't
         noticed=min(after, default=np.inf),  # until the virtual robot was corrected [s]; infinite where it wasn't
         corrections=tuple(float(np.abs(c.error).max()) for c in made),  # largest error of a joint at each [rad]
@@ -100,7 +100,7 @@ def _give(lab: Laboratory, acts: tuple[Act, ...]) -> float:
     return max(act.t for act in acts)
 
 
-def talk(seed: int, length: float, way: Conditions, D: float | None) -> Measured:
+def talk(seed: int, length: float, way: Conditions, D: float | None) -> Results:
     """Commands for some seconds, then quiet."""
     acts = script(np.random.default_rng((seed, 20)), length)
     lab = _lab(seed, way, D)
@@ -109,7 +109,7 @@ def talk(seed: int, length: float, way: Conditions, D: float | None) -> Measured
     return _seen(lab, last, replay(acts).timeline)
 
 
-def block(seed: int) -> Measured:
+def block(seed: int) -> Results:
     """The real arm is held in the middle of a move."""
     rng = np.random.default_rng((seed, 22))
     lab = _lab(seed, Conditions(delay=ConstantDelay("constant", DELAY)), None)
@@ -125,7 +125,7 @@ def block(seed: int) -> Measured:
     return _seen(lab, lab.now, lab.operator.engine.timeline)
 
 
-def work(study: Study, case: str) -> list[Measured]:
+def work(study: Study, case: str) -> list[Results]:
     """Measure a case for every seed."""
     seeds = range(study.seed + 700, study.seed + 700 + study.runs)
     length = min(study.length, 15.0)
@@ -139,7 +139,7 @@ def work(study: Study, case: str) -> list[Measured]:
 
 def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     """How soon they agree, and by how much the virtual robot was corrected."""
-    cases: dict[str, list[Measured]] = dict(zip(CASES, found, strict=True))
+    cases: dict[str, list[Results]] = dict(zip(CASES, found, strict=True))
     claims: list[Claim] = []
     names = {
         "late": f"commands late by {DELAY + SHORT:g} s at the robot",
@@ -194,7 +194,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     return Findings(tuple(claims), (table,), (picture,))
 
 
-def _paint(canvas: Canvas, cases: dict[str, list[Measured]]) -> None:
+def _paint(canvas: Canvas, cases: dict[str, list[Results]]) -> None:
     axes = canvas.subplots(1, 2, sharey=True)
     titles = ("after the last of some late commands", "after the real arm was blocked")
     for ax, case, title in zip(axes, ("late", "blocked"), titles, strict=True):

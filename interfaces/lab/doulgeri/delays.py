@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.lab.claims import Cell, Claim, Findings, Measured, Study, Table, at_most
+from interfaces.lab.claims import Cell, Claim, Findings, Results, Study, Table, at_most
 from interfaces.lab.doulgeri.script import PortLog, ScriptedSite, arrivals, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
@@ -61,7 +61,7 @@ SETTINGS: Final = {
 CASES: Final = (*SETTINGS, "leads")
 
 
-def run(setting: OffsetSetting, seed: int, length: float) -> Measured:
+def run(setting: OffsetSetting, seed: int, length: float) -> Results:
     """Commands that come at random, each to be carried out at once, over constant delays."""
     rng = np.random.default_rng(seed)
     joined = ScriptedSite(setting.D)
@@ -86,7 +86,7 @@ def run(setting: OffsetSetting, seed: int, length: float) -> Measured:
     busy = [f for f, _ in log.frames if 1.0 + setting.lead <= f.t - setting.D <= 1.0 + length]
     verdicts = [broadcaster.status(frame.number) for frame in busy]
     made = [log.outcomes[i.number].made_at for i in designer.history]  # engine's time when each command came [s]
-    return Measured(
+    return Results(
         # How late each command was when it came to the engine [s].
         lateness=tuple(there - i.issued_at for there, i in zip(made, designer.history, strict=True)),
         postponed=float(np.mean(postponed)) if postponed else 0.0,  # share of commands that were
@@ -159,7 +159,7 @@ def conclude(study: Study, found: tuple[list[Any], ...]) -> Findings:
     return Findings(tuple(claims), (Table.of("delays", title, rows),), pictures)
 
 
-def delay_claims(study: Study, setting: OffsetSetting, seen: list[Measured]) -> list[Claim]:
+def delay_claims(study: Study, setting: OffsetSetting, seen: list[Results]) -> list[Claim]:
     """What must hold of the runs at one setting of the offset."""
     late = np.concatenate([s.lateness for s in seen])
     off = float(np.abs(late - setting.lateness).max())
@@ -202,7 +202,7 @@ def _share_claim(text: str, source: str, lead: float, share: Estimate) -> Claim:
     return Claim(text, source, expected, share.value, equal, share.interval)
 
 
-def _row(study: Study, setting: OffsetSetting, seen: list[Measured]) -> tuple[tuple[str, Cell], ...]:
+def _row(study: Study, setting: OffsetSetting, seen: list[Results]) -> tuple[tuple[str, Cell], ...]:
     late = np.concatenate([s.lateness for s in seen])
     share = bootstrap([100 * s.falsified for s in seen], study.seed)
     return (
@@ -251,14 +251,14 @@ def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
     legend(ax, place="upper left")
 
 
-def _paint(canvas: Canvas, first: list[Measured]) -> None:
+def _paint(canvas: Canvas, first: list[Results]) -> None:
     rows = canvas.subplots(len(first), 1, sharex=True)
     for ax, setting, sent in zip(rows, SETTINGS.values(), first, strict=True):
         _timing(ax, setting, sent)
     rows[-1].set_xlabel("time from the issue of the command, s")
 
 
-def _timing(ax: Axes, setting: OffsetSetting, sent: Measured) -> None:
+def _timing(ax: Axes, setting: OffsetSetting, sent: Results) -> None:
     """A command from the user's line to the engine's, and a frame back; each line has its own clock."""
     issued, came = sent.commands[0]
     arrived = came - setting.D - issued

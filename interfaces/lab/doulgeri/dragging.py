@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from interfaces.lab.claims import OWN_BAR, Findings, Measured, Study, Table, at_most, none_of
+from interfaces.lab.claims import OWN_BAR, Findings, Results, Study, Table, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, played, tool
 from interfaces.lab.output import INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
@@ -52,7 +52,7 @@ def hand(rng: np.random.Generator, length: float) -> tuple[Array, Array]:
     return p, np.gradient(p, PERIOD, axis=0)
 
 
-def drag(seed: int, length: float) -> Measured:
+def drag(seed: int, length: float) -> Results:
     """A hand drags the virtual tool for some seconds."""
     rng = np.random.default_rng((seed, 9))
     offsets, speeds = hand(rng, length)
@@ -86,7 +86,7 @@ def drag(seed: int, length: float) -> Measured:
     distance = np.linalg.norm(virtual - pointer, axis=1)
     aside = np.linalg.norm(tool(operator.engine.timeline.sample(play.p)) - real, axis=1)
     used = (np.abs(reference.qd) / limits.qd_max).max(), (np.abs(reference.qdd) / limits.qdd_max).max()
-    return Measured(
+    return Results(
         following=float(np.sqrt(np.mean(distance**2))),  # virtual tool from the hand, root mean square [m]
         largest=float(distance.max()),  # [m]
         lag=_lag(t, pointer, virtual, 1.0),  # of the virtual tool behind the hand [s]
@@ -109,12 +109,12 @@ def _lag(t: ArrayLike, hand: ArrayLike, tool: ArrayLike, longest: float) -> floa
     return np.inf if lag is None else lag
 
 
-def work(study: Study, case: str) -> Measured | None:
+def work(study: Study, case: str) -> Results | None:
     """Drag with one hand; None where that's more than there are runs."""
     return drag(study.seed + int(case), min(study.length, 10.0)) if int(case) < study.runs else None
 
 
-def conclude(study: Study, found: tuple[Measured | None, ...]) -> Findings:
+def conclude(study: Study, found: tuple[Results | None, ...]) -> Findings:
     """Claims for all hands together, a table with a row a hand."""
     seen = [s for s in found if s is not None]
     following = bootstrap([s.following for s in seen], study.seed)
@@ -154,7 +154,7 @@ def conclude(study: Study, found: tuple[Measured | None, ...]) -> Findings:
     return Findings(claims, (Table.of("dragging", title, rows),), (picture,))
 
 
-def _paint(canvas: Canvas, seen: Measured) -> None:
+def _paint(canvas: Canvas, seen: Results) -> None:
     left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.5))
     middle = seen.hand[0]
     for points, colour, style, name in (

@@ -10,7 +10,7 @@ import numpy as np
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal, changed
-from interfaces.lab.claims import OWN_BAR, Findings, Measured, Study, Table, above, at_least, at_most
+from interfaces.lab.claims import OWN_BAR, Findings, Results, Study, Table, above, at_least, at_most
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, arrivals, target, tool
 from interfaces.lab.output import GOOD, MUTED, REAL, VIRTUAL, draw
 from interfaces.lab.statistics import bootstrap
@@ -115,7 +115,7 @@ def acts(kind: str, rng: np.random.Generator, length: float) -> list[Act]:
     return found
 
 
-def measure(kind: str, seed: int, length: float) -> Measured:
+def measure(kind: str, seed: int, length: float) -> Results:
     """One run: an engine does it, a reader rebuilds it from the bytes."""
     rng = np.random.default_rng((seed, 7))
     clock = ManualClock(0.0)
@@ -154,7 +154,7 @@ def measure(kind: str, seed: int, length: float) -> Measured:
     middle = engine.timeline.sample(0.5 * (t[1:] + t[:-1]))
     straight = 0.5 * (frames[1:] + frames[:-1])
     dense = np.linspace(0.0, length, int(200 * length))
-    return Measured(
+    return Results(
         frames=RATE * len(frame),  # number, time and six joints, 50 times a second, as float64 [B/s]
         frames_single=RATE * single,  # the same as float32: half the digits
         segments=size["segments"] / length + pulse / PULSE,  # edits with what they put in, and pulses [B/s]
@@ -183,14 +183,14 @@ def _said(act: Act) -> tuple[Any, ...]:
     return (2, act.t, command.target.q.tolist(), command.execute_at, command.speed, *words)
 
 
-def work(study: Study, case: str) -> list[Measured]:
+def work(study: Study, case: str) -> list[Results]:
     """Measure one kind of motion; a hand's, which costs more, for a shorter time and in fewer runs."""
     moves = case == "moves"
     runs, length = (study.runs, study.length) if moves else (min(study.runs, 3), min(study.length, 4.0))
     return [measure(case, study.seed + k, length) for k in range(runs)]
 
 
-def conclude(study: Study, found: tuple[list[Measured], ...]) -> Findings:
+def conclude(study: Study, found: tuple[list[Results], ...]) -> Findings:
     """Compare bytes."""
     claims, means, rows = [], [], []
     for kind, sizes in zip(MOTIONS, found, strict=True):
@@ -213,7 +213,7 @@ def conclude(study: Study, found: tuple[list[Measured], ...]) -> Findings:
         claims.append(at_most(text, SOURCE, 1e-12, rebuilt))
         text = f"{NAMES[kind]}: who gets compact frames has their joints, off by at most [rad]"
         claims.append(at_most(text, SOURCE, QUANTISED, off))
-        mean = Measured(**{what: float(np.mean([vars(s)[what] for s in sizes])) for what in vars(sizes[0])})
+        mean = Results(**{what: float(np.mean([vars(s)[what] for s in sizes])) for what in vars(sizes[0])})
         means.append(mean)
         rows.append(
             (
@@ -238,7 +238,7 @@ def conclude(study: Study, found: tuple[list[Measured], ...]) -> Findings:
     return Findings(tuple(claims), (table,), (picture,))
 
 
-def _paint(canvas: Canvas, means: list[Measured]) -> None:
+def _paint(canvas: Canvas, means: list[Results]) -> None:
     ax = canvas.add_subplot()
     y = np.arange(len(means))[::-1]
     bars = (

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces import Designer, Viewer
 from interfaces.clients.playhead import FASTEST, QUICKEST, Mode
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Measured, Study, Table, at_most
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table, at_most
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
@@ -105,7 +105,7 @@ def edits(rng: np.random.Generator) -> dict[str, float]:
     return shown
 
 
-def scrub(rng: np.random.Generator) -> Measured:
+def scrub(rng: np.random.Generator) -> Results:
     """Seek, pause and go live, while commands come."""
     session = InteractiveSession()
     for _ in range(8):
@@ -137,7 +137,7 @@ def scrub(rng: np.random.Generator) -> Measured:
     session.joined.run(session.now + 1.0)
     ages = [shown.age for shown in session.other.history if shown.shown_at > 2.0]
     seen = [shown for shown in viewer.history if shown.shown_at >= begin - 1.0]
-    return Measured(
+    return Results(
         seek=seek,  # by form: from a jump to the first frame of that time [s]
         dragged=dragged,  # how far the place of one who paused in the past moved while commands came [s]
         live=(gap, took, promised),  # the gap; how long going live took; how long is promised [s]
@@ -211,7 +211,7 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(claims, (table,), (picture,))
 
 
-def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Measured) -> None:
+def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Results) -> None:
     left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.4))
     y = np.arange(len(rows))[::-1]
     left.barh(y, [1e3 * row[1] for row in rows], 0.6, color=VIRTUAL)

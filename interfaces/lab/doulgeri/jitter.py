@@ -11,7 +11,7 @@ from interfaces.lab.claims import (
     OWN_BAR,
     Cell,
     Findings,
-    Measured,
+    Results,
     Study,
     Table,
     above,
@@ -49,7 +49,7 @@ OVER: Final = 1e-9
 SOURCE: Final = f"Section VII, (a); {OWN_BAR}"
 
 
-def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Measured, Measured]:
+def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Results, Results]:
     """Both sites over datagrams with that delay each way: figures, and what the picture shows.
 
     Args:
@@ -88,7 +88,7 @@ def _done(lab: Laboratory, sent: int) -> bool:
     return report is not None and report.executed >= sent and report.play > max(t.end for t in timelines)
 
 
-def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Measured:
+def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Results:
     limits = MODEL.limits
     play, reference = played(lab)
     leader, follower = tool(replay(acts).timeline.sample(lab.t)), tool(reference.q)
@@ -113,7 +113,7 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Me
     assert path.path_error_mean is not None
     assert path.path_error_p95 is not None
     assert path.path_error_max is not None
-    return Measured(
+    return Results(
         mean=path.path_error_mean,  # path error of the tool over time [m], METRICS
         p95=path.path_error_p95,
         largest=path.path_error_max,
@@ -142,10 +142,10 @@ def _first(p: Array, t: Array) -> tuple[Array, Array]:
     return p[new], t[new]
 
 
-def _trace(lab: Laboratory) -> Measured:
+def _trace(lab: Laboratory) -> Results:
     records = [r for r in lab.link.forward.log.take() if r.arrived is not None]
     t, p = lab.t[::10], played(lab)[0].p[::10]
-    return Measured(
+    return Results(
         t=t,  # [s]
         behind=t - p,  # how far behind the robot plays [s]
         sent=np.array([r.sent for r in records]),  # when packets were sent [s]
@@ -153,12 +153,12 @@ def _trace(lab: Laboratory) -> Measured:
     )
 
 
-def work(study: Study, case: str) -> Measured:
+def work(study: Study, case: str) -> Results:
     """Every seed with both offsets."""
     D = -delay_profile(case).quantile(SHARE)
     pairs = [[run(case, study.seed + k, study.length, d) for d in (None, D)] for k in range(study.runs)]
     adaptive, fixed = zip(*pairs, strict=True)
-    return Measured(
+    return Results(
         D=D,  # the fixed offset [s]
         adaptive=[seen for seen, _ in adaptive],
         fixed=[seen for seen, _ in fixed],
@@ -232,7 +232,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     return Findings(tuple(claims), (Table.of("jitter", title, rows),), pictures)
 
 
-def _differences(results: dict[str, Measured], field: str) -> Array:
+def _differences(results: dict[str, Results], field: str) -> Array:
     """A figure of each run, adaptive less fixed D, (seeds, profiles); a seed gives the same commands everywhere."""
     return np.array([
         [getattr(a, field) - getattr(f, field) for a, f in zip(r.adaptive, r.fixed, strict=True)]
@@ -240,7 +240,7 @@ def _differences(results: dict[str, Measured], field: str) -> Array:
     ]).T  # fmt: skip
 
 
-def _row(study: Study, case: str, how: str, D: float, seen: list[Measured]) -> tuple[tuple[str, Cell], ...]:
+def _row(study: Study, case: str, how: str, D: float, seen: list[Results]) -> tuple[tuple[str, Cell], ...]:
     late = bootstrap([s.time_difference for s in seen], study.seed)
     level = interval_name(study.runs)
     return (
@@ -260,7 +260,7 @@ def _row(study: Study, case: str, how: str, D: float, seen: list[Measured]) -> t
     )
 
 
-def _paint(canvas: Canvas, study: Study, results: dict[str, Measured]) -> None:
+def _paint(canvas: Canvas, study: Study, results: dict[str, Results]) -> None:
     above, below = canvas.subplots(2, 1, sharex=True)
     x = np.arange(len(results))
     for shift, name, colour in ((-0.18, "adaptive", VIRTUAL), (0.18, "fixed", REAL)):
@@ -283,7 +283,7 @@ def _paint(canvas: Canvas, study: Study, results: dict[str, Measured]) -> None:
     legend(above, columns=2, place="upper right")
 
 
-def _paint_run(canvas: Canvas, traces: tuple[Measured, Measured]) -> None:
+def _paint_run(canvas: Canvas, traces: tuple[Results, Results]) -> None:
     ax = canvas.add_subplot()
     for trace, colour, name in zip(traces, (VIRTUAL, REAL), ("adaptive D", "fixed D"), strict=True):
         ax.plot(trace.t, trace.behind, color=colour, label=f"the robot is behind, {name}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Findings, Measured, Study, Table, at_most, none_of
+from interfaces.lab.claims import Claim, Findings, Results, Study, Table, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, target
 from interfaces.lab.output import BAD, MUTED, VIRTUAL, draw, legend
 from vrs import Engine, JointTarget, MotionCommand, PolynomialSegment, Profile, Timeline
@@ -28,7 +28,7 @@ FIG_1: Final = "Fig. 1, eq. (6)"
 II_B: Final = "Section II-B"
 
 
-def example() -> Measured:
+def example() -> Results:
     """A move, and a second command in its linear segment; nothing is scheduled after it."""
     engine = Engine(MODEL, q=HOME, clock=None)
     engine.execute(MotionCommand(JointTarget(HOME + STEP), execute_at=0.5, speed=0.6))
@@ -36,7 +36,7 @@ def example() -> Measured:
     line = moving(before)[1]
     t_exec = line.start + 0.5 * line.duration
     engine.execute(MotionCommand(JointTarget(GOAL), execute_at=t_exec, speed=0.6))
-    return Measured(before=before, after=engine.timeline, t_exec=t_exec)
+    return Results(before=before, after=engine.timeline, t_exec=t_exec)
 
 
 def moving(timeline: Timeline) -> tuple[PolynomialSegment, ...]:
@@ -60,7 +60,7 @@ def jumps(timeline: Timeline) -> tuple[float, float]:
     return worst[0], worst[1]
 
 
-def splice(rng: np.random.Generator) -> Measured:
+def splice(rng: np.random.Generator) -> Results:
     """Four moves, and a command somewhere in the first three, many times: what became of the moves after it."""
     worst, tails, changed, uneven, past = [0.0, 0.0], 0, 0, 0.0, 0.0
     for _ in range(MOVES):
@@ -85,7 +85,7 @@ def splice(rng: np.random.Generator) -> Measured:
         uneven = max(uneven, float(np.ptp(shifts)) if shifts else 0.0)
         early: Array = np.linspace(old.start, t_exec, 200)
         past = max(past, float(np.abs(old.sample(early) - new.sample(early)).max()))
-    return Measured(
+    return Results(
         position_jump=worst[0],
         velocity_jump=worst[1],
         tails=tails,  # tail segments that were compared
@@ -119,48 +119,35 @@ def work(study: Study, _case: str) -> Findings:
         _degrees("a second command in the linear segment", new, "5: 2, 1, 2, 1, 2"),
         Claim(
             "s1 stays as it is, s2' is s2 cut short at t_exec, s3' begins there",
-            FIG_1,
-            "so",
+            FIG_1, "so",
             f"s1 {_kept(kept)}, s2' {_kept(head)}, s3' begins {new[2].start - fig.t_exec:.1e} s after t_exec",
             bool(kept and head and abs(new[1].end - fig.t_exec) <= SAME and abs(new[2].start - fig.t_exec) <= SAME),
         ),
         Claim(
             "with nothing scheduled after it the old target is replaced: distance of the end from the new [rad]",
-            FIG_1,
-            "≤ 1e-9",
-            max(goal, end),
-            bool(replaced and max(goal, end) <= SAME),
+            FIG_1, "≤ 1e-9", max(goal, end), bool(replaced and max(goal, end) <= SAME),
         ),
         at_most(
             f"continuity, a⁰ of s(i+1) = p of s(i) at its end: largest jump [rad], {many}",
-            "Section II, eq. (3)",
-            SAME,
-            position,
+            "Section II, eq. (3)", SAME, position,
         ),
         at_most(f"velocity is continuous too: largest jump [rad/s], {many}", II_B, SAME, velocity),
         none_of(
             f"the tail's coefficients and durations stay the same bits: segments that changed, of {tails}",
-            II_B,
-            changed,
-            of=tails,
+            II_B, changed, of=tails,
         ),
         Claim(
             f"the tail is shifted as one: largest difference of shifts [s], {many}",
-            II_B,
-            "≤ 1e-9",
-            uneven,
-            uneven <= SAME and tails > 0,
+            II_B, "≤ 1e-9", uneven, uneven <= SAME and tails > 0,
         ),
         at_most(
             f"a command modifies the trajectory only from t_exec on: largest change before it [rad], {many}",
-            "Section II-B, eq. (5)",
-            SAME,
-            past,
+            "Section II-B, eq. (5)", SAME, past,
         ),
         at_most(
             "t_exec at or after the end of the last segment: new segments begin then, off by [s]", II_B, SAME, later
         ),
-    )
+    )  # fmt: skip
     columns = ("segment", "start s", "end s", "degree", "a0 deg", "a1 deg/s", "a2 deg/s²")
     rows = [_row(f"s{i + 1}", x) for i, x in enumerate(s)]
     rows += [_row(f"s{i + 1}'" if i else "s1", x) for i, x in enumerate(new)]
@@ -198,7 +185,7 @@ def _row(name: str, segment: PolynomialSegment) -> tuple[str | float, ...]:
     return (name, segment.start, segment.end, degree(segment), *a.tolist())
 
 
-def _paint(canvas: Canvas, fig: Measured) -> None:
+def _paint(canvas: Canvas, fig: Results) -> None:
     ax = canvas.add_subplot()
     old, new = moving(fig.before), moving(fig.after)
     for timeline, style, colour, name in (

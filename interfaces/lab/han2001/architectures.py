@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Measured, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table
 from interfaces.lab.driving.output import of_drives
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
@@ -112,7 +112,7 @@ DRAWN: Final = ("model thu", "micro thu")
 """Cases whose first runs are drawn: like Figures 11, 12 and 15, 16."""
 
 
-def work(study: Study, case: str) -> Measured:
+def work(study: Study, case: str) -> Results:
     """All compositions and seeds of a case; and of a case that is drawn the first seed's runs."""
     robot, profile = case.split()
     runs: Runs = {}
@@ -125,12 +125,12 @@ def work(study: Study, case: str) -> Measured:
             if k == 0 and case in DRAWN:
                 first[name(architecture, transport)] = drive
         runs[name(architecture, transport)] = tuple(found)
-    return Measured(runs=runs, first=first)
+    return Results(runs=runs, first=first)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """The paper's claims, then ours."""
-    found: dict[str, Measured] = dict(zip(CASES, results, strict=True))
+    found: dict[str, Results] = dict(zip(CASES, results, strict=True))
     figures = []
     for case in DRAWN:
         robot, profile = case.split()
@@ -141,7 +141,7 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
 
 
 def _pooled(
-    found: dict[str, Measured],
+    found: dict[str, Results],
     cases: Sequence[str],
     who: str,
     value: Callable[[ArchitectureResult], float],
@@ -156,7 +156,7 @@ def _above_zero(text: str, source: str, values: Array, seed: int) -> Claim:
     return Claim(text, source, "over 0", estimate.value, estimate.low > 0, estimate.interval)
 
 
-def _papers(study: Study, found: dict[str, Measured]) -> tuple[Claim, ...]:
+def _papers(study: Study, found: dict[str, Results]) -> tuple[Claim, ...]:
     of = partial(_pooled, found)
     sim, micro, heavy = ([f"{robot} {profile}" for profile in PROFILES] for robot in ROBOTS)
     real, slow = (*micro, *heavy), [case for case in sim if not case.endswith("domain")]
@@ -165,9 +165,7 @@ def _papers(study: Study, found: dict[str, Measured]) -> tuple[Claim, ...]:
     return (
         _above_zero(
             "I: the path error accumulates, last third less first third [cm]",
-            f"{SECTION}.1, Fig. 12(a)",
-            of(sim, "I", lambda one: 100 * one.growth_error),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(a)", of(sim, "I", lambda one: 100 * one.growth_error), study.seed,
         ),
         Claim(
             "II keeps the path in simulation: median of the largest path error [cm]",
@@ -175,27 +173,19 @@ def _papers(study: Study, found: dict[str, Measured]) -> tuple[Claim, ...]:
         ),
         _above_zero(
             "II: the time difference grows (mon, wed, thu), last third less first third [s]",
-            f"{SECTION}.1, Fig. 12(d)",
-            of(slow, "II", lambda one: one.growth_late),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(d)", of(slow, "II", lambda one: one.growth_late), study.seed,
         ),
         _above_zero(
             "III has a smaller path error than I in simulation: I − III, largest [cm]",
-            f"{SECTION}.1, Fig. 12(e)",
-            of(sim, "I", _largest) - of(sim, "III", _largest),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(e)", of(sim, "I", _largest) - of(sim, "III", _largest), study.seed,
         ),
         _above_zero(
             "III has a smaller time difference than II (mon, wed, thu): II − III, mean [s]",
-            f"{SECTION}.1, Fig. 12(f)",
-            of(slow, "II", _late) - of(slow, "III", _late),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(f)", of(slow, "II", _late) - of(slow, "III", _late), study.seed,
         ),
         _above_zero(
             "II's path error is large in the experiment: micro-robot − simulation, largest [cm]",
-            f"{SECTION}.2, Fig. 16(c)",
-            of(micro, "II", _largest) - of(sim, "II", _largest),
-            study.seed,
+            f"{SECTION}.2, Fig. 16(c)", of(micro, "II", _largest) - of(sim, "II", _largest), study.seed,
         ),
         Claim(
             "III's path error stays small in the experiment, both bodies: median of the largest [cm]",
@@ -203,9 +193,7 @@ def _papers(study: Study, found: dict[str, Measured]) -> tuple[Claim, ...]:
         ),
         _above_zero(
             "III has a smaller path error than II in the experiment, both bodies: II − III, largest [cm]",
-            f"{SECTION}.2, Fig. 16",
-            of(real, "II", _largest) - of(real, "III", _largest),
-            study.seed,
+            f"{SECTION}.2, Fig. 16", of(real, "II", _largest) - of(real, "III", _largest), study.seed,
         ),
     )  # fmt: skip
 
@@ -235,7 +223,7 @@ def _speed(one: ArchitectureResult) -> float:
     return 100 * (one.path.speed_error or 0.0)
 
 
-def _ours(study: Study, found: dict[str, Measured]) -> list[Claim]:
+def _ours(study: Study, found: dict[str, Results]) -> list[Claim]:
     """What III and `timeline` must show on the 75 kg robot, network by network."""
     return [claim for profile in PROFILES for claim in _of_network(study, profile, found[f"ipr {profile}"].runs)]
 
@@ -283,7 +271,7 @@ def _of_network(study: Study, profile: str, runs: Runs) -> Iterator[Claim]:
         yield _most(f"{profile}: {REPEATED}: mean time difference [s]", 0.5, repeated)
 
 
-def _table(found: dict[str, Measured]) -> Table:
+def _table(found: dict[str, Results]) -> Table:
     rows = []
     for case in CASES:
         robot, profile = case.split()

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Cell, Claim, Figure, Findings, Measured, Study, Table
+from interfaces.lab.claims import Cell, Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.kim2006.following import Followed, FollowingCase, run
 from interfaces.lab.output import BAD, GOOD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap
@@ -53,7 +53,7 @@ def pair(rsp: list[Followed], other: list[Followed]) -> tuple[tuple[float, ...],
     return tuple(a for a, _ in both), tuple(b for _, b in both)
 
 
-def work(study: Study, case: str) -> list[Measured]:
+def work(study: Study, case: str) -> list[Results]:
     """All losses, schemes and seeds of a delay profile."""
     found = []
     for loss in LOSSES:
@@ -65,7 +65,7 @@ def work(study: Study, case: str) -> list[Measured]:
             for name in SCHEMES
         }
         found.append(
-            Measured(
+            Results(
                 delay=case,
                 loss=loss,
                 means={name: mean_of(made) for name, made in runs.items()},
@@ -75,15 +75,15 @@ def work(study: Study, case: str) -> list[Measured]:
     return found
 
 
-def mean_of(runs: list[Followed]) -> Measured:
+def mean_of(runs: list[Followed]) -> Results:
     """The means of the figures that are numbers."""
     means = np.mean([one[:8] for one in runs], axis=0).tolist()
-    return Measured(**dict(zip(Followed._fields, means, strict=False)))
+    return Results(**dict(zip(Followed._fields, means, strict=False)))
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """A claim a network and loss, and the table of all schemes."""
-    found: list[Measured] = [one for result in results for one in result]
+    found: list[Results] = [one for result in results for one in result]
     claims = tuple(wins_claim(one) for one in found)
     rows = [_row(one, name) for one in found for name in SCHEMES]
     title = f"Four schemes on the same links, {study.runs} seeds of {study.length:g} s"
@@ -91,7 +91,7 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (table, wins_table(found)), (_drawn(study), _errors(found)))
 
 
-def wins_claim(one: Measured) -> Claim:
+def wins_claim(one: Results) -> Claim:
     """RSP's path error beside that of TCP with fixed packets, over one link."""
     found = difference(*one.pairs["tcp"])
     text = f"{one.delay}, loss {one.loss:g}: path error of RSP − TCP with fixed packets, way that both reached [cm]"
@@ -101,7 +101,7 @@ def wins_claim(one: Measured) -> Claim:
     return Claim(text, SOURCE, "not above 0", 100 * found.value, verdict(*one.pairs["tcp"]) != "other", ends)
 
 
-def _row(one: Measured, name: str) -> tuple[tuple[str, Cell], ...]:
+def _row(one: Results, name: str) -> tuple[tuple[str, Cell], ...]:
     mean = one.means[name]
     return (
         ("delay", one.delay),
@@ -123,7 +123,7 @@ def _finite(value: float) -> Cell:
     return value if math.isfinite(value) else "never"
 
 
-def wins_table(found: list[Measured]) -> Table:
+def wins_table(found: list[Results]) -> Table:
     """Where each scheme is better than RSP, in what."""
     rows: list[tuple[Cell, ...]] = []
     measures = (
@@ -147,7 +147,7 @@ def wins_table(found: list[Measured]) -> Table:
     return Table("wins", "Where another scheme is better than RSP, by more than 10 %", columns, tuple(rows))
 
 
-def _said(found: list[Measured]) -> str:
+def _said(found: list[Results]) -> str:
     return ", ".join(f"{one.delay}/{one.loss:g}" for one in found) or "nowhere"
 
 
@@ -171,7 +171,7 @@ def _drawn(study: Study) -> Figure:
     return draw("paths", "Path following, Fig. 11", paint, height=4.2)
 
 
-def _errors(found: list[Measured]) -> Figure:
+def _errors(found: list[Results]) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         names = [f"{one.delay}\n{one.loss:g}" for one in found]

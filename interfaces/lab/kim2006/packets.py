@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Figure, Findings, Measured, Study, Table
+from interfaces.lab.claims import Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.kim2006.following import cubo_model
 from interfaces.lab.output import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.rsp import header
@@ -41,7 +41,7 @@ def scenario(t: float, length: float, duty: float) -> bool:
     return math.floor(t % third / T + 0.5) * T >= third * (1.0 - duty) - 1e-9
 
 
-def perform(length: float, duty: float, *, sealed: bool = False) -> Measured:
+def perform(length: float, duty: float, *, sealed: bool = False) -> Results:
     """Let CUBO move lip and arms for a time [s], with music for a share of it; the link is perfect."""
     model, rng = cubo_model(), np.random.default_rng(5)
     keys = Keyring({Rank.OPERATOR: b"k" * 32}) if sealed else None
@@ -69,7 +69,7 @@ def perform(length: float, duty: float, *, sealed: bool = False) -> Measured:
             t.append(now)
             sizes.append(size)
         robot.streams.take(speaker)
-    return Measured(
+    return Results(
         t=t,  # when packets went down [s]
         sizes=sizes,  # theirs [byte]
         missing=robot.streams.missing,  # fragments that the robot never had
@@ -124,7 +124,7 @@ def work(_study: Study, _case: str) -> Findings:
     return Findings(claims, (table,), (_sizes(found), _curve(curve, share, measured)))
 
 
-def _sizes(found: Measured) -> Figure:
+def _sizes(found: Results) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         ax.step(found.t, found.sizes, where="post", color=VIRTUAL, linewidth=1.0)

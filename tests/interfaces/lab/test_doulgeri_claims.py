@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Claim, Figure, Measured, Study
+from interfaces.lab.claims import Claim, Figure, Results, Study
 from interfaces.lab.doulgeri import (
     agreement,
     causality,
@@ -42,14 +42,14 @@ def only(claims: Iterable[Claim], *said: str) -> None:
     assert all(any(word in claim for claim in found) for word in said), found
 
 
-def but(seen: Measured, **changes: Any) -> Measured:
+def but(seen: Results, **changes: Any) -> Results:
     """The same, with other figures."""
     assert changes.keys() <= vars(seen).keys()
-    return Measured(**vars(seen) | changes)
+    return Results(**vars(seen) | changes)
 
 
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
-PREDICTED = Measured(
+PREDICTED = Results(
     lateness=(0.0, 0.0), postponed=0.0, ages=(0.0, 0.0, 0.0), shown=0.02, falsified=SHARE, foretold=SHARE
 )
 
@@ -82,7 +82,7 @@ def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
 
 
 NOWHERE = np.zeros((1, 3))
-HAND = Measured(
+HAND = Results(
     following=0.005, largest=0.02, lag=0.05, answered=0.0, limits=1.0, rejected=0, inputs=200, real=5e-4,
     real_lag=0.3, t=np.zeros(1), hand=NOWHERE, virtual=NOWHERE, robot=NOWHERE,
 )  # fmt: skip
@@ -107,7 +107,7 @@ def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
 
 
 def test_encoding() -> None:
-    good = Measured(
+    good = Results(
         frames=120.0, frames_single=60.0, segments=100.0, commands=100.0, between=1e-3, rebuilt=0.0, compact=100.0,
         compact_each=300.0, absolute=200.0, compact_error=1e-5,
     )  # fmt: skip
@@ -144,7 +144,7 @@ def test_the_readers_of_an_encoding_have_the_motion() -> None:
     assert found.compact < found.compact_each < found.frames < found.segments
 
 
-RUN = Measured(
+RUN = Results(
     mean=0.001, p95=0.002, largest=0.004, time_difference=1.0, time_difference_max=2.0, progress=1.0, aside=0.0,
     bursts=0, limits=1.0, pace=1.05, postponed=0, moves=10, corrections=0,
 )  # fmt: skip
@@ -165,8 +165,8 @@ FIXED = but(RUN, mean=0.02, time_difference=3.0, postponed=1)
     ],
 )
 def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
-    def claims(*adaptive: Measured) -> Sequence[Claim]:
-        result = Measured(D=-2.0, adaptive=adaptive, fixed=[FIXED] * 2, traces=())
+    def claims(*adaptive: Results) -> Sequence[Claim]:
+        result = Results(D=-2.0, adaptive=adaptive, fixed=[FIXED] * 2, traces=())
         return jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims
 
     only(claims(RUN, RUN))
@@ -174,7 +174,7 @@ def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
 
 
 def test_a_fixed_offset_that_postpones_nothing_is_said_so() -> None:
-    result = Measured(D=-2.0, adaptive=[RUN] * 2, fixed=[but(FIXED, postponed=0)] * 2, traces=())
+    result = Results(D=-2.0, adaptive=[RUN] * 2, fixed=[but(FIXED, postponed=0)] * 2, traces=())
     only(jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims, "a fixed D postpones")
 
 
@@ -194,7 +194,7 @@ def test_the_fixed_offset_hides_what_95_percent_of_the_packets_take(monkeypatch:
     assert given == [None, -quantile] * 2
 
 
-AGREED = Measured(
+AGREED = Results(
     agreed=1.0, noticed=0.3, corrections=(0.1,), durations=(0.5,), unlinked=0.1, limits=1.0, t=np.zeros(1),
     apart=np.zeros(1),
 )  # fmt: skip
@@ -221,7 +221,7 @@ def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
 
 
-SPLICED = Measured(position_jump=0.0, velocity_jump=0.0, tails=5, changed=0, uneven=0.0, past=0.0)
+SPLICED = Results(position_jump=0.0, velocity_jump=0.0, tails=5, changed=0, uneven=0.0, past=0.0)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
     only(causality.work(STUDY, "").claims, "D = 0: postponed")
 
 
-SCRUBBED = Measured(
+SCRUBBED = Results(
     seek={ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, dragged=0.0, live=(8.0, 1.5, 1.5), others=0.0, t=(0.0,),
     place=(0.0,),
 )  # fmt: skip

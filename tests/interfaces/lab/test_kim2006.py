@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Measured, Study
+from interfaces.lab.claims import Results, Study
 from interfaces.lab.kim2006 import PAPER, links, packets
 from interfaces.lab.kim2006.following import Followed, FollowingCase, course, path_leader, run
 from interfaces.lab.kim2006.links import pair, verdict
@@ -129,7 +129,7 @@ def test_the_verdict_is_the_paired_intervals() -> None:
 def test_a_claim_fails_where_tcp_is_nearer() -> None:
     pairs = dict.fromkeys(("tcp", "fixed", "repeated"), ((0.02, 0.021), (0.01, 0.011)))
     mean = links.mean_of([followed(0.01, 1)])
-    worse = Measured(delay="mon", loss=0.1, means=dict.fromkeys(SCHEMES, mean), pairs=pairs)
+    worse = Results(delay="mon", loss=0.1, means=dict.fromkeys(SCHEMES, mean), pairs=pairs)
     assert not links.wins_claim(worse).holds
     rows = links.wins_table([worse]).rows
     assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]
