@@ -1,4 +1,4 @@
-"""Write what is derived from the definitions of messages: the script that checks them in pages, documents' tables.
+"""Write what is derived from definitions: of messages the script that checks them in pages; tables of documents.
 
 `make generate` writes them, `python .ci/generate.py --check` says which are stale.
 """
@@ -32,10 +32,11 @@ from interfaces.messages.description import (
 from interfaces.messages.fields import Party
 from interfaces.recording.channels import CHANNELS
 from interfaces.stream.codec import KINDS
+from interfaces.val2.monitor.commands import COMMANDS
 
 HOME = Path(__file__).resolve().parents[1]
 SCRIPT = HOME / "interfaces" / "stream" / "static" / "protocol.js"
-DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md"
+DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md", HOME / "docs" / "console.md"
 COMMAND = "make generate"
 
 
@@ -380,7 +381,9 @@ def _sizes(kind: Any) -> str:
 
 # The documents' tables.
 
-MARKED = re.compile(r"<!-- (fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S)
+MARKED = re.compile(
+    r"<!-- (commands|fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S
+)
 Names = dict[str, str]
 """What a document calls what has a table of its own there, by the name of its class."""
 
@@ -415,6 +418,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         what, name = match[1], match[2]
         if what == "roles":
             rows = _roles_table(known)
+        elif what == "commands":
+            rows = _commands_table()
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
@@ -446,6 +451,15 @@ def _topics_table(tags: dict[str, str]) -> list[str]:
             one = described(kind)
             of = "mobile" if kind not in channel.arm else "any" if kind in channel.mobile else "arm"
             rows.append(_row(f"`{channel.topic}`", f"`{one.tag or channel.schema}`", of, _told(one.text, tags)))
+    return rows
+
+
+def _commands_table() -> list[str]:
+    """The monitor's commands: * beside a program that runs, too; + ours."""
+    rows = ["| command | does |", "|---|---|"]
+    for one in COMMANDS.values():
+        marks = " +" * one.ours + " *" * (not one.idle)
+        rows.append(_row(" ".join(f"`{usage}`" for usage in one.usage) + marks, one.help))
     return rows
 
 
@@ -609,11 +623,12 @@ def _figure(number: Any) -> str:
 def derived() -> dict[Path, str]:
     """Every file that has something derived, as it's to be."""
     found, stored = messages(), recorded()
-    protocol, recording = DOCUMENTS
+    protocol, recording, console = DOCUMENTS
     return {
         SCRIPT: script(found),
         protocol: document(protocol.read_text(encoding="utf-8"), found),
         recording: document(recording.read_text(encoding="utf-8"), stored),
+        console: document(console.read_text(encoding="utf-8"), ()),
     }
 
 
@@ -626,7 +641,7 @@ def main(asked: list[str]) -> int:
     """Write what is stale, or with `--check` only name it."""
     for path in (found := stale()):
         if "--check" in asked:
-            print(f"{path.relative_to(HOME)} isn't what the definitions of messages say: run `{COMMAND}`")
+            print(f"{path.relative_to(HOME)} isn't what the definitions say: run `{COMMAND}`")
         else:
             path.write_text(derived()[path], encoding="utf-8")
             print(f"wrote {path.relative_to(HOME)}")

@@ -133,6 +133,8 @@ class LedgerEntry(NamedTuple):
     """What its reason is the text of; empty where it was rejected."""
     refusal: enum.Enum | None = None
     """Why somebody outside the engine refused it; None where nobody did, or no code was given."""
+    profile: Profile | None = None
+    """By which profile it moves the arm, where an engine that goes on elsewhere must be told; else None."""
 
 
 class Change(NamedTuple):
@@ -414,7 +416,7 @@ class Ledger(Generic[_TimelineT]):
 
     def rewrite(self, receipt: Receipt, notes: Notes | None = None) -> None:
         """Write over a receipt of a command that goes on, and its notes unless they're None, without a way back."""
-        old, command, known, _ = self.entries[receipt.command_id]
+        old, command, known, *_ = self.entries[receipt.command_id]
         if old.is_still and old.end is not None and (old.end, old.command_id) in self.stills:
             self.stills.remove((old.end, old.command_id))
         self._set(LedgerEntry(receipt, command, known if notes is None else notes))
@@ -522,20 +524,6 @@ MOST_KNOWN = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Known:
-    """A command that isn't over, or by which the arm moved last."""
-
-    receipt: Receipt
-    """As it is now."""
-    command: MotionCommand | None
-    """What it answers; None where it's no motion command."""
-    profile: Profile
-    """By which profile it moves the arm."""
-    notes: Notes = ()
-    """What its receipt says for people, as far as that's known."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Standing:
     """What the next commands of an engine depend on, besides its timeline.
 
@@ -550,4 +538,4 @@ class Standing:
     """In force."""
     steered: tuple[int, float] | None = None
     """The command that the next steering input goes on with, and when that began [s]."""
-    known: tuple[Known, ...] = ()
+    known: tuple[LedgerEntry, ...] = ()

@@ -61,7 +61,7 @@ from vrs.insertion import (
     span,
     stay,
 )
-from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Known, Ledger, LedgerEntry, Names, Receipt, Standing, Status
+from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Ledger, LedgerEntry, Names, Receipt, Standing, Status
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import Passer, join, move
 from vrs.notes import Note, NoteCode, Notes, is_rough, text_of
@@ -906,11 +906,11 @@ class Scheduler(BaseScheduler[Timeline]):
         for command_id in ledger.stills_from(now):
             names.setdefault(command_id)
         known = tuple(
-            Known(
+            LedgerEntry(
                 ledger.receipt(command_id),
                 ledger.command(command_id),
-                self.profile(command_id),
                 ledger.notes(command_id),
+                profile=self.profile(command_id),
             )
             for command_id in sorted(names)[-MOST_KNOWN:]
             if command_id != HOLD and command_id in ledger
@@ -922,8 +922,8 @@ class Scheduler(BaseScheduler[Timeline]):
         self.ledger.newest = stand.newest
         self.lateness, self.limits = stand.lateness, stand.limits
         for one in stand.known:
-            self.ledger.note(LedgerEntry(one.receipt, one.command, one.notes))
-            if one.command is None:
+            self.ledger.note(one)
+            if one.command is None and one.profile is not None:
                 self.note_profile(one.receipt.command_id, one.profile)
         if stand.steered is not None and stand.steered[0] in self.ledger:
             self.go_on_steering(*stand.steered)

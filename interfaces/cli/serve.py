@@ -48,7 +48,7 @@ from interfaces.cli.options import (
     start_robot,
 )
 from interfaces.system import software
-from robots.robot import USUAL, load
+from robots.robot import USUAL, HeadCamera, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.model import home
@@ -200,6 +200,8 @@ def serve(
         if jobs.exists() and not jobs.is_file():
             raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
         makes(architecture)
+        if robot.device(HeadCamera) is None:
+            without(robot.name, {"camera": (camera, CAMERA)})
         if camera:
             number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
         serving = MobileServing(

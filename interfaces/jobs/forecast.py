@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from interfaces.jobs.devices import speaking_time
+from interfaces.jobs.runner import speaking_time
 from interfaces.messages.fields import MOST_POINTS
 from interfaces.messages.jobs import (
     ArmJob,

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Final, Protocol, TypeAlias
 
 from msgspec.structs import replace
+from typing_extensions import override
 
 from interfaces.messages.jobs import (
     ArmJob,
@@ -31,41 +32,8 @@ from vrs.checks import finite, validated, within
 
 
 @dataclass(frozen=True, slots=True)
-class OperatorLost:
-    """Nobody is heard any more who could stop the robot: the policy says what follows."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Interrupted:
-    """The robot has to stop, whatever the policy: it touches something, or is told to."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Done:
-    """What was asked for has been done."""
-
-    attempt: int
-
-
-@dataclass(frozen=True, slots=True)
-class JobFailed:
-    """What was asked for can't be done."""
-
-    attempt: int
-    reason: str
-
-
-Input: TypeAlias = ListCommand | OperatorLost | Interrupted | Done | JobFailed
-"""What a runner is told."""
-
-
-@dataclass(frozen=True, slots=True)
 class CarryOut:
-    """Do a job; answer with `Done` or `JobFailed`."""
+    """Do a job; answer when it's done, or can't be."""
 
     attempt: int
     job: MoveJob | VoiceJob | ArmJob
@@ -88,6 +56,67 @@ class EndJob:
 
 Request: TypeAlias = CarryOut | Show | EndJob
 """What a runner asks for."""
+
+
+SYLLABLE: Final = 0.065
+"""So long a character takes to be spoken, about 170 words a minute [s]."""
+BREATH: Final = 0.3
+"""And each text besides [s]."""
+
+
+def speaking_time(text: str) -> float:
+    """About how long it takes to say something [s]."""
+    return BREATH + SYLLABLE * len(text)
+
+
+class Speaker(Protocol):
+    """Whatever says something aloud, one text at a time."""
+
+    def speak(self, text: str, *, now: float) -> None:
+        """Begin to say something, in place of anything else, at a time [s]."""
+
+    def hush(self) -> None:
+        """Be silent at once."""
+
+    def is_speaking(self, *, now: float) -> bool:
+        """Whether what was begun isn't over yet."""
+
+
+class ArmControl(Protocol):
+    """Whatever carries out VAL-II programs on an arm, one at a time."""
+
+    def run(self, program: str, source: str, *, now: float) -> str:
+        """Begin a program at a time [s]; why it can't be, empty if it has begun."""
+
+    def end(self, *, now: float) -> None:
+        """Stop the arm."""
+
+    def outcome(self, *, now: float) -> str | None:
+        """What became of the program: None while it runs, empty if it came to its end, else why not."""
+
+
+class SilentSpeaker(Speaker):
+    """Says nothing, and takes as long as saying it would: where there's no loudspeaker."""
+
+    def __init__(self) -> None:
+        """Be silent."""
+        self.text = ""
+        """What is being said."""
+        self._until = -math.inf
+
+    @override
+    def speak(self, text: str, *, now: float) -> None:
+        self.text, self._until = text, now + speaking_time(text)
+
+    @override
+    def hush(self) -> None:
+        self.text, self._until = "", -math.inf
+
+    @override
+    def is_speaking(self, *, now: float) -> bool:
+        if now >= self._until:
+            self.text = ""
+        return now < self._until
 
 
 RUNS = "the list is being done: pause or abort it first"
@@ -157,7 +186,8 @@ class JobRunner:
             config: How to behave.
         """
         self.jobs = JobList() if jobs is None else jobs
-        self._config = RunnerConfig() if config is None else config
+        self.config = RunnerConfig() if config is None else config
+        """How it behaves."""
         self.progress = Progress.of(self.jobs)
         """How far it is."""
         self._requests: list[Request] = []
@@ -175,11 +205,6 @@ class JobRunner:
         return runner
 
     @property
-    def config(self) -> RunnerConfig:
-        """How it behaves."""
-        return self._config
-
-    @property
     def running(self) -> bool:
         """Whether the list is being done."""
         return self.progress.stage is JobStage.RUNNING
@@ -190,28 +215,38 @@ class JobRunner:
         wait = self._waiting()
         return wait is not None and wait.seconds is None
 
-    def receive(self, message: Input, *, now: float) -> str:
-        """Take in what a person asks for, or what became of a request.
+    def receive(self, command: ListCommand, *, now: float) -> str:
+        """Take in what a person asks for at a time [s]; why it isn't done, empty if it is."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        return self._commanded(command, now)
+
+    def answer(self, attempt: int, failure: str | None = None, *, now: float) -> None:
+        """Take in what became of a request; of an attempt that's over it counts for nothing.
 
         Args:
-            message: That.
+            attempt: Its number.
+            failure: Why it can't be done; None if it has been.
             now: [s].
-
-        Returns:
-            Why it isn't done; empty if it is. An answer to an attempt that's over counts for nothing.
         """
         self._catch_up(finite("now", now, "finite seconds"))
-        match message:
-            case ListCommand():
-                return self._commanded(message, now)
-            case Done() | JobFailed():
-                self._answered(message, now)
-            case OperatorLost(reason):
-                if self._config.loss is OperatorLoss.STOP:
-                    self._pause(reason, now)
-            case Interrupted(reason):
-                self._pause(reason, now)
-        return ""
+        if not self._open or attempt != self._attempt:
+            return
+        self._open, self._due = False, math.inf
+        if failure is None:
+            self._finish(now)
+        else:
+            self._stage_of_running(JobStage.FAILED, failure)
+
+    def interrupt(self, reason: str, *, now: float) -> None:
+        """Pause: the robot has to stop, whatever the policy, as it touches something, or is told to."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        self._pause(reason, now)
+
+    def lose_operator(self, reason: str, *, now: float) -> None:
+        """Follow the policy: nobody is heard any more who could stop the robot."""
+        self._catch_up(finite("now", now, "finite seconds"))
+        if self.config.loss is OperatorLoss.STOP:
+            self._pause(reason, now)
 
     def load(self, jobs: JobList, progress: Progress | None = None, *, now: float) -> str:
         """Take a list in place of the one before.
@@ -304,15 +339,6 @@ class JobRunner:
             self._requests.append(EndJob(self._attempt))
         self._open, self._due = False, math.inf
 
-    def _answered(self, answer: Done | JobFailed, now: float) -> None:
-        if not self._open or answer.attempt != self._attempt:
-            return
-        self._open, self._due = False, math.inf
-        if isinstance(answer, Done):
-            self._finish(now)
-        else:
-            self._stage_of_running(JobStage.FAILED, answer.reason)
-
     def _finish(self, now: float) -> None:
         """The running job is done: on to the next."""
         job = self.progress.running
@@ -337,7 +363,7 @@ class JobRunner:
 
     def _ask(self, job: MoveJob | VoiceJob | WaitJob | ArmJob, before: JobProgress, now: float) -> None:
         """Let a job be carried out."""
-        config = self._config
+        config = self.config
         if isinstance(job, WaitJob):
             seconds = job.seconds if before.left is None else before.left
             self._due = math.inf if seconds is None else now + seconds

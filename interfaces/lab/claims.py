@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Annotated, Any, TypeAlias
 
+from interfaces.lab.statistics import Estimate
 from vrs.checks import validated, within
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
@@ -64,6 +66,60 @@ class Claim:
     """Interval over seeds of what was measured, see `interfaces.lab.statistics`; None where nothing is random."""
 
 
+def at_most(
+    claim: str, source: str, bar: float, measured: float | Estimate, *, slack: float = 0.0, note: str = ""
+) -> Claim:
+    """A claim that holds if what was measured, or the upper end of its interval, is no more than a bar.
+
+    Args:
+        claim: What is claimed, with the unit of what was measured.
+        source: Where.
+        bar: What there should be at most.
+        measured: What there was.
+        slack: How far the bar may be passed, by rounding.
+        note: What the bar is, said behind it.
+    """
+    highest = measured.high if isinstance(measured, Estimate) else measured
+    return _beside(claim, source, f"≤ {_number(bar)}{note}", measured, holds=highest <= bar + slack)
+
+
+def at_least(claim: str, source: str, bar: float, measured: float | Estimate, *, note: str = "") -> Claim:
+    """A claim that holds if what was measured, or the lower end of its interval, is no less than a bar."""
+    lowest = measured.low if isinstance(measured, Estimate) else measured
+    return _beside(claim, source, f"≥ {_number(bar)}{note}", measured, holds=lowest >= bar)
+
+
+def above(claim: str, source: str, bar: float, measured: float | Estimate) -> Claim:
+    """A claim that holds if what was measured, or the lower end of its interval, is more than a bar."""
+    lowest = measured.low if isinstance(measured, Estimate) else measured
+    return _beside(claim, source, f"> {_number(bar)}", measured, holds=lowest > bar)
+
+
+def below_zero(claim: str, source: str, difference: Estimate) -> Claim:
+    """A claim that holds if the interval of a difference lies below zero."""
+    return _beside(claim, source, "< 0", difference, holds=difference.is_below_zero)
+
+
+def none_of(claim: str, source: str, count: int, *, of: int = 1) -> Claim:
+    """A claim that holds if nothing was counted among something."""
+    return Claim(claim, source, 0, count, count == 0 and of > 0)
+
+
+def _beside(claim: str, source: str, expected: str, measured: float | Estimate, *, holds: bool) -> Claim:
+    if isinstance(measured, Estimate):
+        return Claim(claim, source, expected, measured.value, holds, measured.interval)
+    return Claim(claim, source, expected, measured, holds)
+
+
+def _number(bar: float) -> str:
+    """A bar as claims spell it: 1e-9."""
+    return f"{bar:g}".replace("e-0", "e-")
+
+
+class Results(SimpleNamespace):
+    """What was measured, by name; whoever makes one says beside each figure what it is."""
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """Figures in rows."""
@@ -78,6 +134,17 @@ class Table:
         for row in self.rows:
             if len(row) != len(self.columns):
                 raise InvalidValueError("row", row, f"of {len(self.columns)} cells")
+
+    @classmethod
+    def of(cls, name: str, title: str, rows: Iterable[Sequence[tuple[str, Cell]]]) -> Table:
+        """A table of rows whose cells say which column they're in.
+
+        Raises:
+            ValueError: If rows name other columns than the others do, or there are none.
+        """
+        named = tuple(rows)
+        (columns,) = {tuple(column for column, _ in row) for row in named}
+        return cls(name, title, columns, tuple(tuple(cell for _, cell in row) for row in named))
 
 
 @dataclass(frozen=True, slots=True)

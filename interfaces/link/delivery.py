@@ -22,7 +22,7 @@ class Outgoing(Generic[T]):
     def __init__(self) -> None:
         """Start with none."""
         self.waiting: dict[int, T] = {}
-        """By number, in that order; what is taken out of it is sent no more."""
+        """By number, those that were put there first in front; what is taken out is sent no more."""
         self.count = 0
         """Messages added so far: the number of the newest."""
         self.acknowledged = 0

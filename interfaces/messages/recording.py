@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from copy import copy
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
@@ -32,7 +32,7 @@ from interfaces.messages.segments import MOST_POWERS, placed, written
 from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
-from vrs.ledger import Known, Receipt
+from vrs.ledger import LedgerEntry, Receipt
 from vrs.mobile import Grid
 from vrs.model import Array
 from vrs.notes import rough_in
@@ -325,7 +325,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
     """Whether it moves the arm with bounded jerk."""
 
     @property
-    def known(self) -> Known:
+    def known(self) -> LedgerEntry:
         """What an engine that goes on from here is told.
 
         Raises:
@@ -335,7 +335,7 @@ class GivenEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="given"):
         if command is not None and not isinstance(command, MotionCommand):
             raise InvalidValueError("command", command, "a motion command")
         profile = Profile.JERK_LIMITED if self.smooth else Profile.PARABOLIC
-        return Known(self.receipt, command, profile, rough_in(self.receipt.reason))
+        return LedgerEntry(self.receipt, command, rough_in(self.receipt.reason), profile=profile)
 
 
 UNSAID = -math.inf
@@ -637,10 +637,8 @@ def room_entry(room: Room) -> RoomEntry:
 
 
 def _thing_entry(thing: Block | Column) -> ThingEntry:
-    start, end = (t if math.isfinite(t) else None for t in (thing.start, thing.end))
-    radius, length, width = (getattr(thing, name, None) for name in ("radius", "length", "width"))
-    at = thing.name, thing.x, thing.y, thing.height
-    return ThingEntry(*at, length, width, getattr(thing, "angle", 0.0), radius, thing.known, start, end)
+    held = {one.name: getattr(thing, one.name) for one in fields(thing)}
+    return ThingEntry(**{name: value for name, value in held.items() if value not in {-math.inf, math.inf}})
 
 
 def room_of(entry: RoomEntry, where: str) -> Room:
@@ -672,14 +670,11 @@ def _ascend(times: tuple[float, ...]) -> bool:
 
 
 def _thing(entry: ThingEntry, where: str) -> Block | Column:
-    start = -math.inf if entry.start is None else entry.start
-    end = math.inf if entry.end is None else entry.end
-    if entry.radius is not None:
-        return Column(entry.name, entry.x, entry.y, entry.radius, entry.height, entry.known, start, end)
-    if entry.length is None or entry.width is None:
+    if entry.radius is None and (entry.length is None or entry.width is None):
         raise FormatError(where, f"{entry.name!r} in its room has no size")
-    sides = entry.length, entry.width, entry.angle
-    return Block(entry.name, entry.x, entry.y, *sides, entry.height, entry.known, start, end)
+    kind: type[Block | Column] = Block if entry.radius is None else Column
+    held = {one.name: getattr(entry, one.name) for one in fields(kind)}
+    return kind(**{name: value for name, value in held.items() if value is not None})
 
 
 def grid_facts(grid: Grid) -> GridFacts:

@@ -418,16 +418,9 @@ def _drive_case(recording: Recording) -> DriveCase:
     if facts is None:
         raise FormatError(str(recording.path), "of no mobile robot")
     try:
-        return DriveCase(
-            architecture=facts.architecture,
-            transport=Transport(facts.transport),
-            delay=begin.delay,
-            robot=facts.body,
-            operator=facts.operator,
-            seed=begin.seed or 0,
-            length=facts.length,
-            position=facts.position,
-        )
+        same = {name: getattr(facts, name) for name in ("architecture", "operator", "length", "position")}
+        transport, seed = Transport(facts.transport), begin.seed or 0
+        return DriveCase(transport=transport, delay=begin.delay, robot=facts.body, seed=seed, **same)
     except InvalidValueError as error:
         raise FormatError(str(recording.path), f"its beginning: {error}") from None
 

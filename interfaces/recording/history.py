@@ -55,19 +55,9 @@ def _change(
     change = difference(before, after, at, edit=edit, command_id=command_id)
     if change is None or len(change.segments) > MOST_CHANGED:
         return None
-    return ChangeEntry(
-        edit=edit,
-        base=change.base,
-        at=at,
-        version=after.version,
-        first=change.first - cut,
-        dof=after.dof,
-        segments=change.segments,
-        tail=None if change.tail is None else change.tail - cut,
-        tail_start=change.tail_start,
-        end=change.end,
-        command_id=command_id,
-    )
+    tail = None if change.tail is None else change.tail - cut
+    same = {name: getattr(change, name) for name in ("edit", "base", "segments", "tail_start", "end", "command_id")}
+    return ChangeEntry(at=at, version=after.version, first=change.first - cut, dof=after.dof, tail=tail, **same)
 
 
 def _arc_change(

@@ -34,7 +34,7 @@ from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
 from robots.robot import Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
-from vrs.ledger import Known, Receipt
+from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
 from vrs.segment import times
 
@@ -256,7 +256,7 @@ class Recording:
         return tuple(found[number] for number in sorted(found))
 
     @property
-    def given(self) -> tuple[Known, ...]:
+    def given(self) -> tuple[LedgerEntry, ...]:
         """Commands from before the recording that weren't over when it began.
 
         Raises:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice, takewhile
 from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
+from interfaces.link.delivery import Outgoing
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages import Refusal
 from interfaces.messages.commands import check_crosses
@@ -225,14 +226,10 @@ class OperatorSite:
         """The newest one."""
         self.receipts: dict[int, Receipt] = {}
         """What the robot's engine answered, by command id."""
-        self.entries_sent = 0
-        """Journal entries sent since the robot began anew."""
-        self.under_way: OrderedDict[int, tuple[LogEntry, float]] = OrderedDict()
-        """Entries that aren't acknowledged, and when they were sent last [s], in that order."""
-        self._acknowledged = 0
-        self.new_entries: list[int] = []
-        """Numbers of those that haven't been sent at all."""
-        self._recent: deque[int] = deque(maxlen=self.config.repeat)
+        self.log: Outgoing[tuple[LogEntry, float]] = Outgoing()
+        """Entries since the robot began anew, and when they were sent last [s]; they wait in that order."""
+        self.newest_sent = 0
+        """Number of the newest that was sent at all."""
         self.command_ids: dict[int, int] = {}
         """By entry's number, where its answer hasn't come."""
         self._packets = 0
@@ -276,7 +273,7 @@ class OperatorSite:
             return not_following(self.gone)
         if self.halted is not None:
             return not_following(f"{self.halted.text}; resume first")
-        if len(self.under_way) >= _UNDER_WAY_MOST:
+        if len(self.log.waiting) >= _UNDER_WAY_MOST:
             return Refusal(f"{_UNDER_WAY_MOST} commands wait to be acknowledged")
         return None
 
@@ -286,7 +283,7 @@ class OperatorSite:
         Raises:
             InvalidValueError: If it can't be sent, or the plan goes on for too long; nothing is written then.
         """
-        number, now, command, answer = self.entries_sent + 1, deed.at, deed.command, deed.receipt
+        number, now, command, answer = self.log.count + 1, deed.at, deed.command, deed.receipt
         if answer is None or answer.status is not Status.REJECTED:
             number_in("end of the plan", self.engine.timeline.end, -LATEST, LATEST, "a session time", " s")
             if command is not None and answer is not None:
@@ -295,11 +292,9 @@ class OperatorSite:
                 check_crosses(command)
             entry = LogEntry(number, now, newest, command)
             # From here on nothing may raise.
+            self.log.add((entry, now))
             if command is not None and answer is not None:
                 self.command_ids[number] = answer.command_id
-            self.under_way[number] = entry, now
-            self.new_entries.append(number)
-            self.entries_sent = number
         self.inform(lambda listener: listener.commanded(deed))
 
     def inform(self, tell: Callable[[SiteObserver], None]) -> None:
@@ -315,34 +310,29 @@ class OperatorSite:
 
     def advance(self, *, now: float) -> tuple[Orders, ...]:
         """Do what is due by now [s], and say what is to be sent."""
-        if now < self._due and not self.new_entries:
+        if now < self._due and self.newest_sent == self.log.count:
             return ()
         self._due = now + self.config.beat
         self._packets += 1
-        chosen = self.new_entries + [n for n in self._recent if n in self.under_way]
-        self._recent.extend(self.new_entries)
-        self.new_entries = []
+        waiting, patience = self.log.waiting, self._patience
         # In the order of their sending: what seems to be lost stands in front.
-        patience, under_way = self._patience, self.under_way
-        lost: list[int] = []
-        for number, (_, sent) in under_way.items():
-            if now - sent <= patience or len(lost) == self.config.resent:
-                break
-            lost.append(number)
+        overdue = takewhile(lambda number: now - waiting[number][1] > patience, waiting)
+        lost = list(islice(overdue, self.config.resent))
         for number in lost:
-            under_way[number] = under_way[number][0], now
-            under_way.move_to_end(number)
-        entries = tuple(under_way[n][0] for n in sorted({*chosen, *lost}) if n in under_way)
+            waiting[number] = waiting.pop(number)[0], now
+        chosen = {*range(self.newest_sent + 1 - self.config.repeat, self.log.count + 1), *lost}
+        entries = tuple(waiting[number][0] for number in sorted(chosen) if number in waiting)
+        self.newest_sent = self.log.count
         heard = 0 if self.report is None else self.report.number
         wanted = self.gathering.wanted(now=now, patience=patience)
         # A robot that knows that it has halted isn't told.
         halted = "" if self.report is None or self.report.halted else text_of(self.halted)
-        facts = self.entries_sent, now, self._began, heard, entries, wanted, halted
+        facts = self.log.count, now, self._began, heard, entries, wanted, halted
         return (Orders(Epoch(self.epoch), self._packets, now, *facts),)
 
     def next_deadline(self) -> float:
         """When there's something to send, by the operator's clock [s]."""
-        return self.clock.now() if self.new_entries else self._due
+        return self.clock.now() if self.newest_sent < self.log.count else self._due
 
     def receive(self, report: Report, *, now: float) -> None:
         """Take in a report of the robot; where it was measured counts whatever the epoch, and however late."""
@@ -356,7 +346,7 @@ class OperatorSite:
             return
         answered: list[tuple[int, Receipt]] = []
         for number, receipt in report.receipts:
-            known = self.under_way.pop(number, None)
+            known = self.log.waiting.pop(number, None)
             if known is not None or number in self.command_ids:
                 answered.append((self.command_ids.pop(number, receipt.command_id), receipt))
         self.receipts.update(answered)
@@ -394,13 +384,11 @@ class OperatorSite:
 
     def _watch_progress(self, report: Report, now: float) -> None:
         """Count a robot as halted that hears what is sent and yet carries nothing out."""
-        progressed = report.executed > self._acknowledged
-        for number in range(self._acknowledged + 1, min(report.executed, self.entries_sent) + 1):
-            self.under_way.pop(number, None)
-        self._acknowledged = max(self._acknowledged, report.executed)
-        if self.halted or self._acknowledged >= self.entries_sent:
+        had = self.log.acknowledged
+        self.log.acknowledge(report.executed)
+        if self.halted or self.log.acknowledged == self.log.count:
             self._waits = None
-        elif progressed or self._waits is None:
+        elif self.log.acknowledged > had or self._waits is None:
             self._waits = now, now, 0.0
         elif report.echo is not None and report.echo[1] > self._waits[1]:
             (since, before, hearing), heard = self._waits, report.echo[1]
@@ -437,8 +425,8 @@ class OperatorSite:
     def _give_up(self, halt: Halt) -> None:
         """Command the robot no more until somebody resumes; it's told so."""
         self.halted = halt
-        self.under_way.clear()
-        self.new_entries = []
+        self.log.waiting.clear()
+        self.newest_sent = self.log.count
         self._waits = None
         self._due = self.clock.now()
 
@@ -450,13 +438,13 @@ class OperatorSite:
     def _follow(self, part: PlanPart, reason: str) -> None:
         """Let the virtual robot follow the real one's plan, and what is still under way to it."""
         now = self.clock.now()
-        compared = part.version, self.entries_sent, len(self.under_way), self.engine.timeline.version
+        compared = part.version, self.log.count, len(self.log.waiting), self.engine.timeline.version
         if compared == self._compared:
             return
         plan = Timeline(part.initial, part.since, part.segments, part.version)
         clock = ManualClock(part.since)
         expected = Engine(self._model, timeline=plan, clock=clock, lateness=self._lateness)
-        for entry, _ in sorted(self.under_way.values(), key=lambda waiting: waiting[0].number):
+        for _, (entry, _) in sorted(self.log.waiting.items()):
             clock.set(max(entry.at, clock.now()))
             try:
                 if entry.command is not None:
@@ -494,10 +482,7 @@ class OperatorSite:
             left = self.engine.timeline.end - now
             return f"the virtual robot is being put where the real one is for another {left:.2f} s"
         self.epoch, self._began, self.halted = self.epoch + 1, now, None
-        self.entries_sent, self._acknowledged, self._due = 0, 0, now
-        self.new_entries = []
-        self._recent.clear()
-        self.under_way.clear()
+        self.log, self.newest_sent, self._due = Outgoing(), 0, now
         self.command_ids.clear()
         self._waits = self._of_earlier = None
         return ""

@@ -14,7 +14,7 @@ from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import kind_of
 from interfaces.val2.functions import row_of
 from interfaces.val2.grammar import SIGNIFICANT
-from interfaces.val2.instructions import stands_for_frame
+from interfaces.val2.instructions import STATEMENTS, stands_for_frame
 from interfaces.val2.memory import mismatch
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
@@ -27,10 +27,8 @@ from interfaces.val2.syntax import (
     Compound,
     Expression,
     Format,
-    Ignored,
     Instruction,
     Program,
-    Statement,
     Step,
     Text,
     Variable,
@@ -66,7 +64,9 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFindi
     found = [_error(error) for error in unreadable.values()]
     if not source.programs and not unreadable:
         found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
-    found += check(source, unreadable.keys(), words_of(text, unreadable))
+    checker = _Checker(source, unreadable.keys(), words_of(text, unreadable))
+    for program in source.programs:
+        found += checker.program(program)
     found += _alike_names(text)
     return None if unreadable else source, sorted(found, key=_order)
 
@@ -76,71 +76,51 @@ def _order(finding: CheckFinding) -> tuple[int, int]:
     return (0, 0) if place is None else (place.line, place.column)
 
 
-def check(source: SourceFile, unreadable: Collection[int] = (), words: Collection[str] = ()) -> list[CheckFinding]:
-    """What is wrong with the programs of a file, one after the other.
-
-    Args:
-        source: The file.
-        unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
-        words: Names that those lines may have set.
-    """
-    checker = _Checker(source, unreadable, words)
-    return [finding for program in source.programs for finding in checker.program(program)]
-
-
 class _Checker:
+    """What is wrong with the programs of a file."""
+
     def __init__(self, source: SourceFile, unreadable: Collection[int], words: Collection[str]) -> None:
+        """Gather what the file sets.
+
+        Args:
+            source: The file.
+            unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
+            words: Names that those lines may have set.
+        """
         self._unreadable = unreadable
         self._programs = {program.name: program for program in source.programs}
         self._context = Context(Arm(EngineRobot(Engine(puma560.model()))), compiled)
         """For what compiling shows; nothing runs in it."""
-        self._set: dict[str, set[str]] = defaultdict(set)
-        """Programs by which names are set; the empty name stands for all."""
-        self._known: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        """Kinds of what names were set to, by their scopes; the empty name stands for all."""
-        for entry in source.values:
-            self._set[""].add(entry.variable.name)
-        for entry in source.locations:
-            self._known[""][entry.variable.name].add("frame")
-        for entry in source.reals:
-            self._known[""][entry.variable.name].add("real")
+        self._set: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        """Names that are set, by the programs whose own they are, and the kinds of what they're set to; the empty
+        name stands for all programs."""
+        for kind, entries in (("frame", source.locations), ("real", source.reals), ("string", source.strings)):
+            for entry in entries:
+                self._set[""][entry.variable.name].add(kind)
         for program in source.programs:
-            self._gather(program)
-        self._set[""].update(words)
-
-    def _gather(self, program: Program) -> None:
-        own = self._own(program)
-        for parameter in program.parameters:
-            self._set[program.name].add(parameter.name)
-        for step in program.steps:
-            for variable in writes(step.statement):
-                scope = program.name if variable.name in own else ""
-                self._set[scope].add(variable.name)
-                self._known[scope][variable.name].add(_given(step.statement))
+            own = self._own(program)
+            self._set[program.name] |= {parameter.name: set() for parameter in program.parameters}
+            for i in (step.statement for step in program.steps):
+                for name in (variable.name for variable in writes(i)):
+                    self._set[program.name if name in own else ""][name].add(_given(i))
+        for word in words:
+            self._set[""][word].update()
 
     @staticmethod
-    def _own(program: Program) -> frozenset[str]:
+    def _own(program: Program) -> set[str]:
         """Names that are the program's own."""
-        names = {parameter.name for parameter in program.parameters}
-        for step in program.steps:
-            match step.statement:
-                case Instruction("AUTO" | "LOCAL", variables):
-                    names |= {variable.name for variable in variables}
-        return frozenset(names)
+        local = (step.statement for step in program.steps if step.statement.keyword in ("AUTO", "LOCAL"))
+        return {v.name for v in (*program.parameters, *(v for i in local for v in i.operands))}
 
     def program(self, program: Program) -> Iterator[CheckFinding]:
         """What is wrong with a program."""
         structure, errors = survey(program)
         yield from (_error(e) for e in errors if e.place is None or e.place.line not in self._unreadable)
-        own = self._own(program)
-        parameters = {parameter.name for parameter in program.parameters}
+        own, parameters = self._own(program), {parameter.name for parameter in program.parameters}
+        usable = {name: kinds for name, kinds in self._set[""].items() if name not in own} | self._set[program.name]
         known = {
-            name: next(iter(given))
-            for scope in ("", program.name)
-            for name, given in self._known[scope].items()
-            if len(given) == 1 and name not in parameters and (scope or name not in own)
+            name: next(iter(kinds)) for name, kinds in usable.items() if len(kinds) == 1 and name not in parameters
         }
-        usable = self._set[program.name] | {name for name in self._set[""] if name not in own}
         reported: set[str] = set()
         for number, step in enumerate(program.steps, 1):
             if step.at.line in self._unreadable:
@@ -154,11 +134,11 @@ class _Checker:
                 yield CheckFinding(finding.severity, error, error.place)
 
     def _step(
-        self, step: Step, known: dict[str, str], usable: set[str], reported: set[str]
+        self, step: Step, known: dict[str, str], usable: Collection[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         statement, read = step.statement, reads(step.statement)
-        if isinstance(statement, Ignored) and statement.keyword not in forms.UNAVAILABLE:
-            detail = f"{statement.keyword} {statement.rest}".rstrip() + " is passed over"
+        if statement.passed is not None and statement.keyword not in forms.UNAVAILABLE:
+            detail = f"{statement.keyword} {statement.passed}".rstrip() + " is passed over"
             yield _warning(ValError("No meaning here", detail, place=statement.at))
         yield from (_warning(error) for error in _capped(statement))
         errors = [*self._calls(statement), *_set_parameter(statement)]
@@ -176,7 +156,7 @@ class _Checker:
             yield from self._unset(expression, asked, usable, reported)
 
     def _unset(
-        self, expression: Expression, asked: Kind, usable: set[str], reported: set[str]
+        self, expression: Expression, asked: Kind, usable: Collection[str], reported: set[str]
     ) -> Iterator[CheckFinding]:
         """Names that nothing in the file sets, each once in a program; functions that do nothing."""
         match expression:
@@ -192,7 +172,7 @@ class _Checker:
         for child, kind in wanted(expression):
             yield from () if kind == "name" else self._unset(child, kind, usable, reported)
 
-    def _calls(self, statement: Statement) -> Iterator[ValError]:
+    def _calls(self, statement: Instruction) -> Iterator[ValError]:
         match statement:
             case Instruction("CALL" | "GOSUB", arguments, at=at, program=name):
                 called = self._programs.get(name)
@@ -219,16 +199,16 @@ class _Checker:
 def _case(step: Step, head: Step, known: dict[str, str]) -> Iterator[ValError]:
     """CASE of what is neither a number nor a string, and VALUE of what can't be the same."""
     i = step.statement
-    if not isinstance(head.statement, Instruction) or head.statement.keyword != "CASE":
+    if head.statement.keyword != "CASE":
         return
     (given,) = head.statement.operands
-    values = i.operands if isinstance(i, Instruction) and i.keyword in ("VALUE", "CASE") else ()
+    values = i.operands if i.keyword in ("VALUE", "CASE") else ()
     wanted: Kind = "string" if kind_of(given, known) == "string" else "real"
     for value in values:
         yield from mistakes(value, wanted, known)
 
 
-def _given(statement: Statement) -> str:
+def _given(statement: Instruction) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
         case Instruction("=" | "DECOMPOSE" | "FOR"):
@@ -245,7 +225,7 @@ def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
         yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
 
 
-def _set_parameter(statement: Statement) -> Iterator[ValError]:
+def _set_parameter(statement: Instruction) -> Iterator[ValError]:
     """A number that a parameter can't be."""
     match statement:
         case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
@@ -255,9 +235,9 @@ def _set_parameter(statement: Statement) -> Iterator[ValError]:
                 yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
-def _capped(statement: Statement) -> Iterator[ValError]:
+def _capped(statement: Instruction) -> Iterator[ValError]:
     """Shares that are written down and count as less."""
-    shares = ("percent",) if {"MMPS", "IPS"} & set(getattr(statement, "words", ())) else ("percent", "speed")
+    shares = ("percent",) if {"MMPS", "IPS"} & set(statement.words) else ("percent", "speed")
     for operand, kind in _operands(statement):
         value = literal(operand)
         if kind in shares and value is not None and value > MOST_PERCENT:
@@ -289,7 +269,7 @@ def _alike_names(text: str) -> Iterator[CheckFinding]:
                 yield _warning(ValError("Long names", detail, place=TextPosition(number, found.start() + 1)))
 
 
-def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
+def _operands(i: Instruction) -> Iterator[tuple[Expression, Kind]]:
     """The operands of an instruction, and what kind each has to be of: `variable` for what it may set."""
     match i:
         case Instruction("=" | "SET", (target, value)):
@@ -307,22 +287,22 @@ def _operands(i: Statement) -> Iterator[tuple[Expression, Kind]]:
             yield only, "any"
         case Instruction("CALL" | "GOSUB", given):
             yield from ((a, "variable" if isinstance(a, Variable) else "any") for a in given if a is not None)
-        case Instruction(keyword, operands) if keyword not in ("", "AUTO", "LOCAL", "GLOBAL"):
-            row = forms.INSTRUCTIONS[keyword]
+        case Instruction(keyword, operands, passed=None) if keyword not in ("AUTO", "LOCAL", "GLOBAL"):
+            row = STATEMENTS[keyword]
             for n, operand in enumerate(operands if row.slots else ()):
                 if operand is not None and not isinstance(operand, Format):
                     yield operand, row.slot(n).kind
 
 
-def reads(statement: Statement) -> list[tuple[Expression, Kind]]:
+def reads(statement: Instruction) -> list[tuple[Expression, Kind]]:
     """What a statement reads, and what kind each has to be of; indices of what it sets among it."""
     found = [one for one in _operands(statement) if one[1] != "variable"]
-    if isinstance(statement, Instruction) and statement.begins is not None:
+    if statement.begins is not None:
         found.append((statement.begins, "real"))
     return found + [(index, "real") for target in writes(statement) for index in target.indices]
 
 
-def writes(statement: Statement) -> Iterator[Variable]:
+def writes(statement: Instruction) -> Iterator[Variable]:
     """The variables that a statement may set; `$DECODE` shortens its first argument."""
     for operand, kind in _operands(statement):
         if kind == "variable" and isinstance(operand, Variable):
@@ -337,9 +317,10 @@ def writes(statement: Statement) -> Iterator[Variable]:
 def wanted(expression: Expression) -> Iterator[tuple[Expression, Kind]]:
     """The parts of an expression, and what kind each has to be of; those of `+` and relations have to be alike."""
     if isinstance(expression, Apply):
+        row = row_of(expression)
         for n, argument in enumerate(expression.arguments):
             if argument is not None and not isinstance(argument, Format):
-                yield argument, row_of(expression).slot(n).kind
+                yield argument, row.slot(n).kind
     else:
         kind: Kind = "frame" if isinstance(expression, Compound) else "real"
         yield from ((child, kind) for child in children(expression))
@@ -381,13 +362,15 @@ _STANDING: Final = ("HERE", "DEST")
 
 def _misused(expression: Expression, asked: Kind) -> Iterator[ValError]:
     """What is wrong with the numbers that are written down."""
-    if (value := literal(expression)) is not None and asked in _CHECKS:
+    value = literal(expression)
+    if value is None:
+        for part, kind in wanted(expression):
+            yield from _misused(part, kind)
+    elif asked in _CHECKS:
         try:
             _CHECKS[asked](value)
         except ValError as error:
             yield error.at(place=expression.at)
-    for part, kind in wanted(expression):
-        yield from _misused(part, kind)
 
 
 def mistakes(expression: Expression, asked: Kind, known: Mapping[str, str]) -> Iterable[ValError]:

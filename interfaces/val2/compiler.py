@@ -11,7 +11,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.forms import UNAVAILABLE
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
-from interfaces.val2.syntax import Ignored, Instruction, Program, Step
+from interfaces.val2.syntax import Instruction, Program, Step
 
 
 def compiled(program: Program, context: Context) -> Code:
@@ -53,28 +53,29 @@ def _whatever(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
 
 
 def _step(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
-    statement = step.statement
-    if isinstance(statement, Instruction):
-        act = STATEMENTS[statement.keyword].act
-        assert act is not None
-        made: StepFunction = act(x, statement, n)
-        return made
-    keyword = statement.keyword
-    if keyword in UNAVAILABLE:
-        raise ValError("Not available", f"{keyword}: {UNAVAILABLE[keyword]}", place=statement.at)
-    warning = Warned(f"{keyword} has no meaning here: program {x.program.name}, step {n + 1}")
+    i = step.statement
+    act = STATEMENTS[i.keyword].act if i.passed is None else _passed_over
+    assert act is not None
+    made: StepFunction = act(x, i, n)
+    return made
 
-    def ignored(_: Slots) -> int:
+
+def _passed_over(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    if i.keyword in UNAVAILABLE:
+        raise ValError("Not available", f"{i.keyword}: {UNAVAILABLE[i.keyword]}", place=i.at)
+    warning = Warned(f"{i.keyword} has no meaning here: program {x.program.name}, step {n + 1}")
+
+    def warn(_: Slots) -> int:
         x.context.warn(warning)
         return n + 1
 
-    return ignored
+    return warn
 
 
 def standalone_error(step: Step) -> ValError | None:
     """Why a step can't stand alone, as DO wants it; None if it can."""
     i = step.statement
-    if isinstance(i, Instruction) and "program" in STATEMENTS[i.keyword].tags:
+    if i.passed is None and "program" in STATEMENTS[i.keyword].tags:
         return ValError("Control structure error", "it's for programs", place=step.at)
     return None
 
@@ -82,6 +83,6 @@ def standalone_error(step: Step) -> ValError | None:
 def runs_beside_program(step: Step) -> bool:
     """Whether a step takes no time and moves nothing."""
     i = step.statement
-    if isinstance(i, Ignored) or (i.keyword == "SPEED" and "MONITOR" not in i.words):
+    if i.passed is not None or (i.keyword == "SPEED" and "MONITOR" not in i.words):
         return False
     return "beside" in STATEMENTS[i.keyword].tags

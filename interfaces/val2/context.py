@@ -126,23 +126,14 @@ class Invoke:
 
 
 @dataclass(frozen=True, slots=True)
-class Leave:
-    """RETURN, or the end of a program."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finished:
-    """The cycle (`STOP`, `END`), or the program for good (`HALT`), has ended: the arm stands."""
+class Ending:
+    """A call, a program or its running has ended."""
 
     word: str
-
-
-@dataclass(frozen=True, slots=True)
-class Suspend:
-    """PAUSE before a step."""
-
-    step: int
-    """Index of the step to go on with."""
+    """`RETURN` for the call, `STOP` and `END` for the cycle, `HALT` for the program, `PAUSE` for its running; the
+    arm stands but for RETURN."""
+    step: int = 0
+    """Index of the step to go on with after PAUSE."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +147,8 @@ class Waiting:
 
 ARM: Final = -1.0
 """What a wait yields for the arm's own deadline."""
-Wait: TypeAlias = Generator[float, None, "int | Finished | Suspend"]
-Action: TypeAlias = "Invoke | Leave | Finished | Suspend | Waiting | int"
+Wait: TypeAlias = Generator[float, None, "int | Ending"]
+Action: TypeAlias = "Invoke | Ending | Waiting | int"
 """What a special step wants done; a number is the next step's index, after reactions have been looked at."""
 
 

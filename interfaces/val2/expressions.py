@@ -90,28 +90,22 @@ class Expressions:
             return lambda s: index(part(s), at)
         return lambda s: tuple(index(p(s), at) for p in parts)
 
-    def found(self, variable: Variable) -> Callable[[Slots], VariableSlot | None]:
-        """The slot of a variable; None for an element that doesn't exist."""
-        place = self.slot(variable.name)
+    def found(self, variable: Variable, *, make: bool = False) -> Closure:
+        """The slot of a variable; an element that doesn't exist is made, or None."""
+        place, memory = self.slot(variable.name), self.context.memory
         if not variable.indices:
             return (lambda s: s[place]) if isinstance(place, int) else (lambda _: place)
         key = self.key(variable)
 
         def element(s: Slots) -> VariableSlot | None:
             array: VariableSlot = s[place] if isinstance(place, int) else place
-            return array.elements.get(key(s)) if array.elements else None
+            return memory.element(array, key(s)) if make else (array.elements or {}).get(key(s))
 
         return element
 
     def reference(self, variable: Variable) -> Callable[[Slots], VariableSlot]:
         """The slot of a variable, made if need be: to be set, or an argument."""
-        place = self.slot(variable.name)
-        if not variable.indices:
-            return (lambda s: s[place]) if isinstance(place, int) else (lambda _: place)
-        key, memory = self.key(variable), self.context.memory
-        if isinstance(place, int):
-            return lambda s: memory.element(s[place], key(s))
-        return lambda s: memory.element(place, key(s))
+        return self.found(variable, make=True)
 
     def read(self, variable: Variable, *, location: bool = False) -> Closure:
         """The value of a variable, whatever it is."""

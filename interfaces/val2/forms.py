@@ -15,14 +15,12 @@ from interfaces.val2.instructions import INSTRUCTIONS
 from interfaces.val2.rows import PARAMETERS, SWITCHES
 
 __all__ = [
-    "ALIASES", "CONSTANTS", "FORMATS", "FUNCTIONS", "IGNORED", "INSTRUCTIONS", "LEVELS", "OPERATORS", "PARAMETERS",
+    "ALIASES", "CONSTANTS", "FORMATS", "FUNCTIONS", "IGNORED", "INSTRUCTIONS", "OPERATORS", "PARAMETERS",
     "SWITCHES", "UNAVAILABLE", "WORDS",
 ]  # fmt: skip
 
 OPERATORS: Final = {row.name: row.help for row in functions.OPERATORS.values() if row.name.isalpha()}
 """Operators that are words."""
-LEVELS: Final = {row.name: row.level for row in functions.OPERATORS.values() if len(row.slots) == 2}
-"""How tightly operators between two operands bind; of one level, from left to right."""
 
 IGNORED: Final = frozenset((
     "ABORT", "ATTACH", "BITS", "CLEAR.EVENT", "CYCLE.END", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "EXECUTE",

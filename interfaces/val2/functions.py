@@ -168,7 +168,8 @@ def _speed(c: Context, which: float) -> float:
     return c.arm.monitor_speed()
 
 
-_REAL_FUNCTIONS: Final = (
+_FUNCTIONS: Final = (
+    # Of numbers.
     Form("ABS", "x -> real", "Absolute value.", "VAL-II", abs),
     Form("ASC", "text:string, index?=1 -> real", "Code of a character.", "VAL-II", _asc),
     Form("ATAN2", "y, x -> real", "Angle of a direction [deg].", "VAL-II",
@@ -216,9 +217,7 @@ _REAL_FUNCTIONS: Final = (
     Form("FALSE", "-> real", "0.", "VAL-II", lambda: 0.0, tags="constant"),
     Form("ON", "-> real", "-1.", "VAL-II", lambda: TRUE, tags="constant"),
     Form("OFF", "-> real", "0.", "VAL-II", lambda: 0.0, tags="constant"),
-)  # fmt: skip
-
-_STRING_FUNCTIONS: Final = (
+    # Strings.
     Form("$CHR", "code -> string", "The character of a code.", "VAL-II", _chr),
     Form("$DECODE", "$variable:variable, separators:string, mode?=0 -> string",
          "What stands before, or with mode 1 the run of, separators; it's taken out of the variable.", "V+"),
@@ -226,9 +225,7 @@ _STRING_FUNCTIONS: Final = (
     Form("$MID", "text:string, from, length -> string", "Part of a string.", "VAL-II", _mid),
     Form("$TRUNCATE", "text:string -> string", "A string up to its first character of code 0.", "V+",
          lambda text: text.partition("\0")[0]),
-)  # fmt: skip
-
-_LOCATION_FUNCTIONS: Final = (
+    # Locations.
     Form("TRANS", "x?=0, y?=0, z?=0, o?=90, a?=-90, t?=0 -> frame",
          "A transformation [mm, deg]; without angles, no turn.", "VAL-II", from_oat),
     Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
@@ -250,9 +247,7 @@ _LOCATION_FUNCTIONS: Final = (
          lambda c: c.arm.here(now=c.now).joints, tags="constant context"),
     Form("#DEST", "-> location", "Where the arm goes, as a precision point.", "V+",
          lambda c: c.arm.destination(now=c.now).joints, tags="constant context"),
-)  # fmt: skip
-
-_IDLE_FUNCTIONS: Final = (
+    # Of files and tasks, without meaning here.
     Form("IOSTAT", "lun:any, mode:any? -> real", "State of a file.", "V+", tags="idle"),
     Form("GETC", "lun:any, mode:any? -> real", "A character of a file.", "V+", tags="idle"),
     Form("LNGB", "text:string, from:any? -> real", "An integer of bytes.", "V+", tags="idle"),
@@ -263,9 +258,7 @@ _IDLE_FUNCTIONS: Final = (
     Form("$FLTB", "value:any -> string", "Bytes of a number.", "V+", tags="idle"),
 )  # fmt: skip
 
-FUNCTIONS: Final[dict[str, Form]] = {
-    row.name: row for row in (*_REAL_FUNCTIONS, *_STRING_FUNCTIONS, *_LOCATION_FUNCTIONS, *_IDLE_FUNCTIONS)
-}
+FUNCTIONS: Final[dict[str, Form]] = {row.name: row for row in _FUNCTIONS}
 """Functions and constants, with their prefixes."""
 
 ALIASES: Final = {"PPOINT": "#PPOINT", "#PDEST": "#DEST", "#PHERE": "#HERE"}

@@ -25,11 +25,9 @@ from interfaces.val2.context import (
     Action,
     Asked,
     Context,
-    Finished,
+    Ending,
     Invoke,
-    Leave,
     StepFunction,
-    Suspend,
     Typed,
     Waiting,
 )
@@ -76,9 +74,8 @@ class ProgramCompiler(Expressions):
         self.names = len(program.parameters)
         self.kept: dict[int, int] = {}
         for i in (step.statement for step in program.steps):
-            if not isinstance(i, Instruction) or i.keyword not in ("AUTO", "LOCAL"):
-                continue
-            for name in (v.name for v in i.operands if v.name not in scope):
+            own = i.operands if i.keyword in ("AUTO", "LOCAL") else ()
+            for name in (v.name for v in own if v.name not in scope):
                 if i.keyword == "AUTO":
                     scope[name] = self.names
                     self.names += 1
@@ -353,9 +350,9 @@ def _alteration(do: Do) -> Act:
     return act
 
 
-def _ending(end: Callable[[Instruction, int], Finished | Suspend]) -> Act:
-    """What ends or pauses a program when the arm stands."""
-    return lambda x, i, n: x.special(lambda _: Waiting(_standing(x.context, lambda: None, end(i, n))))
+def _end_run(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """PAUSE, STOP, HALT, when the arm stands."""
+    return x.special(lambda _: Waiting(_standing(x.context, lambda: None, Ending(i.keyword, n + 1))))
 
 
 def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -449,7 +446,7 @@ def _divide(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
 
 
 def _leave(x: ProgramCompiler, _i: Instruction, _n: int) -> StepFunction:
-    action = Leave()
+    action = Ending("RETURN")
     return x.special(lambda _: action)
 
 
@@ -467,7 +464,7 @@ def _end(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
     if block.kind != "FOR":
         return lambda _: target
     k, body, following = x.keep(block.start), block.start + 1, n + 1
-    variable: Variable = x.program.steps[block.start].statement.operands[0]  # type: ignore[union-attr]
+    variable: Variable = x.program.steps[block.start].statement.operands[0]
 
     def again(s: Slots) -> int:
         kept = s[k]
@@ -510,7 +507,7 @@ def _case(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     for arm in block.arms:
         statement = x.program.steps[arm].statement
         if statement.keyword == "VALUE":
-            arms.append(([x.of_kind(kind, v) for v in statement.operands], arm + 1))  # type: ignore[union-attr]
+            arms.append(([x.of_kind(kind, v) for v in statement.operands], arm + 1))
         else:
             otherwise = arm + 1
 
@@ -693,7 +690,8 @@ def _wanted(names: tuple[Variable, ...]) -> str:
 
 # The table.
 
-_MOTION: Final = (
+_ROWS: Final = (
+    # Motions.
     Form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", _motion(_move)),
     Form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", _motion(_move)),
     Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL",
@@ -721,14 +719,13 @@ _MOTION: Final = (
     Form("BRAKE", "", "Stop the present motion at once.", "V+",
          _at_rest(_nothing, lambda c, _: c.arm.brake(now=c.now))),
     Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
-         _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]"),
-)  # fmt: skip
-
-_SETTINGS: Final = (
+         _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]", rule="timed"),
+    # Settings.
     Form("SPEED", "speed:speed, turning:percent?",
          "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.", "VAL", _now(_speed),
          words="MMPS|IPS|MONITOR ALWAYS", tags="beside"),
-    Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate)),
+    Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate),
+         rule="channel"),
     Form("DURATION", "seconds:seconds", "Shortest time of the next motion; ALWAYS: each.", "V+",
          _now(lambda c, i, t: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
     Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", _now(_tolerance),
@@ -749,23 +746,25 @@ _SETTINGS: Final = (
          _at_rest(lambda c, _, tool: c.arm.set_tool(NULL if tool is None else tool))),
     Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
          "Where the robot stands in the world: shifted [mm], turned about z [deg].", "VAL", _at_rest(_base)),
-    Form("ENABLE", "", "Turn switches on.", "VAL", _now(_switch), usage="ENABLE switch, ..", tags="beside"),
-    Form("DISABLE", "", "Turn switches off.", "VAL", _now(_switch), usage="DISABLE switch, ..", tags="beside"),
+    Form("ENABLE", "", "Turn switches on.", "VAL", _now(_switch), usage="ENABLE switch, ..", tags="beside",
+         rule="switches"),
+    Form("DISABLE", "", "Turn switches off.", "VAL", _now(_switch), usage="DISABLE switch, ..", tags="beside",
+         rule="switches"),
     Form("PARAMETER", "value", "Set a parameter.", "VAL-II",
-         _now(lambda c, i, value: c.parameter(i.words[0], value)), usage="PARAMETER name = value", tags="beside"),
+         _now(lambda c, i, value: c.parameter(i.words[0], value)), usage="PARAMETER name = value", tags="beside",
+         rule="parameter"),
     Form("ALTER", "channel?=0, mode:mode?=0, dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
          "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", _alteration(_alter),
-         usage="ALTER (channel) mode", tags="beside"),
+         usage="ALTER (channel) mode", tags="beside", rule="channel"),
     Form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
          "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II",
          _alteration(_correct), tags="beside"),
     Form("NOALTER", "", "Corrections of the path end.", "VAL-II",
          _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),
-    Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode"),
+    Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode",
+         rule="channel"),
     Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
-)  # fmt: skip
-
-_HAND: Final = (
+    # Hand.
     Form("OPEN", "", "Open the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(True))),
     Form("CLOSE", "", "Close the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(False))),
     Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
@@ -778,85 +777,80 @@ _HAND: Final = (
          _at_rest(lambda c, _: c.arm.actuate(None, now=c.now))),
     Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
          _grasp),
-)  # fmt: skip
-
-_LOCATIONS: Final = (
+    # Locations.
     Form("SET", "variable:variable, location:location", "Assign a location.", "VAL", _set,
-         usage="SET variable = location", tags="beside"),
+         usage="SET variable = location", tags="beside", rule="assignment"),
     Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", _here,
          tags="beside"),
     Form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
-         "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside"),
+         "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside", rule="assignment"),
     Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", _passed,
-         usage="SHIFT variable BY dx, dy, dz"),
-)  # fmt: skip
-
-_SIGNALS: Final = (
+         usage="SHIFT variable BY dx, dy, dz", rule="shift"),
+    # Signals and time.
     Form("SIGNAL", "number:output*", "Turn outputs on, or off where negative.", "VAL",
          _now(lambda c, _, *numbers: c.signals.set(numbers)), tags="beside"),
     Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
     Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
     Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
     Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
-         usage="TIMER number = seconds", tags="beside"),
+         usage="TIMER number = seconds", tags="beside", rule="timing"),
     Form("REACT", "signal:signal, program:program?",
-         "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS"),
+         "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS",
+         rule="reaction"),
     Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
-         words="ALWAYS"),
+         words="ALWAYS", rule="reaction"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
          _now(lambda c, _, signal: c.reactions.ignore(signal))),
-)  # fmt: skip
-
-_CONTROL: Final = (
+    # Control.
     Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
-         usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program"),
+         usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program", rule="branch"),
     Form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", _divide,
-         tags="opens closes program"),
-    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", _end, tags="closes program"),
+         tags="opens closes program", rule="nothing"),
+    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", _end, tags="closes program", rule="nothing"),
     Form("WHILE", "condition:condition", "Repeat steps as long as a condition holds.", "VAL-II", _if,
-         usage="WHILE condition DO .. END", tags="opens program"),
+         usage="WHILE condition DO .. END", tags="opens program", rule="while"),
     Form("DO", "", "Repeat steps until a condition holds.", "VAL-II", _passed, usage="DO .. UNTIL condition",
-         tags="opens program"),
-    Form("UNTIL", "condition:condition", "The end of DO.", "VAL-II", _if, tags="closes program"),
+         tags="opens program", rule="nothing"),
+    Form("UNTIL", "condition:condition", "The end of DO.", "VAL-II", _if, tags="closes program", rule="until"),
     Form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", _for,
-         usage="FOR variable = start TO stop [STEP step] .. END", tags="opens program"),
+         usage="FOR variable = start TO stop [STEP step] .. END", tags="opens program", rule="loop"),
     Form("CASE", "value:any", "Do the steps of one of several values.", "VAL-II", _case,
-         usage="CASE value OF .. END", tags="opens program"),
+         usage="CASE value OF .. END", tags="opens program", rule="case"),
     Form("VALUE", "value:any*", "What of a CASE is done for these values.", "VAL-II", _divide,
-         usage="VALUE value, ..:", tags="opens closes program"),
-    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide, tags="opens closes program"),
-    Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program"),
-    Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump, tags="program"),
-    Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program"),
+         usage="VALUE value, ..:", tags="opens closes program", rule="values"),
+    Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide, tags="opens closes program",
+         rule="nothing"),
+    Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program", rule="loops"),
+    Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump, tags="program",
+         rule="loops"),
+    Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program", rule="goto"),
     Form("CALL", "argument:any?*", "Call a program; arguments by reference.", "VAL-II", _call,
-         usage="CALL program(argument, ..)"),
-    Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program"),
-    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program"),
-    Form("PAUSE", "", "Pause until PROCEED.", "VAL", _ending(lambda _, n: Suspend(n + 1))),
-    Form("STOP", "", "End this cycle of the program.", "VAL", _ending(lambda i, _: Finished(i.keyword))),
-    Form("HALT", "", "End the program, whatever cycles are left.", "VAL",
-         _ending(lambda i, _: Finished(i.keyword))),
-)  # fmt: skip
-
-_DIALOGUE: Final = (
-    Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside"),
-    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt),
+         usage="CALL program(argument, ..)", rule="call"),
+    Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program", rule="call"),
+    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program", rule="nothing"),
+    Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
+    Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
+    Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
+    # Dialogue and names.
+    Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
+         rule="items"),
+    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt,
+         rule="prompt"),
     Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text"),
     Form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", _passed,
-         usage="AUTO [REAL|LOC] name, ..", tags="program"),
+         usage="AUTO [REAL|LOC] name, ..", tags="program", rule="names"),
     Form("LOCAL", "name:variable*", "Names of this program alone.", "V+", _passed,
-         usage="LOCAL [REAL|LOC] name, ..", tags="program"),
+         usage="LOCAL [REAL|LOC] name, ..", tags="program", rule="names"),
     Form("GLOBAL", "name:variable*", "Names of all programs, as they are without a word.", "V+", _passed,
-         usage="GLOBAL [REAL|LOC] name, ..", tags="program"),
+         usage="GLOBAL [REAL|LOC] name, ..", tags="program", rule="names"),
 )  # fmt: skip
 
-INSTRUCTIONS: Final[dict[str, Form]] = {
-    row.name: row for row in (*_MOTION, *_SETTINGS, *_HAND, *_LOCATIONS, *_SIGNALS, *_CONTROL, *_DIALOGUE)
-}
+INSTRUCTIONS: Final[dict[str, Form]] = {row.name: row for row in _ROWS}
 """Keywords of a program's lines."""
 STATEMENTS: Final = {
     **INSTRUCTIONS,
     "": Form("", "", "Nothing, or a comment alone.", "VAL", _passed),
-    "=": Form("=", "variable:variable, value:alike", "Assign a number or a string.", "VAL", _assign, tags="beside"),
-}
+    "=": Form("=", "variable:variable, value:alike", "Assign a number or a string.", "VAL", _assign,
+              rule="assignment", tags="beside"),
+}  # fmt: skip
 """Lines that begin with no keyword among them."""

@@ -13,13 +13,11 @@ from interfaces.val2.context import (
     Action,
     Code,
     Context,
-    Finished,
+    Ending,
     Invoke,
-    Leave,
     ProgramEnded,
     ProgramFailed,
     ProgramPaused,
-    Suspend,
     Waiting,
 )
 from interfaces.val2.errors import ValError
@@ -182,13 +180,13 @@ class Task:
             case Invoke(code, slots, following):
                 self._push(CallFrame(code, slots, frame.level))
                 frame.pc = following
-            case Leave():
+            case Ending("RETURN"):
                 self._leave(frame)
-            case Finished(word):
-                self._finish(word)
-            case Suspend(step):
+            case Ending("PAUSE", step):
                 frame.pc = step
                 self.pause("PAUSE")
+            case Ending(word):
+                self._finish(word)
 
     def _push(self, frame: CallFrame) -> None:
         if len(self.frames) >= MOST_CALLS:
@@ -207,14 +205,11 @@ class Task:
             self.context.memory.release(slot)
 
     def _finish(self, word: str) -> None:
-        self._unwind()
         if word == "HALT" or self.cycles in (0, 1):
-            self.state, self.word, self.cycles = ProgramState.IDLE, word, 0
-            self._forget()
-            self.context.events.append(
-                ProgramEnded(self.code.program.name, word if self.code.program.name else "DO")
-            )
+            self.cycles = 0
+            self.end(word if self.code.program.name else "DO")
             return
+        self._unwind()
         self.cycles = max(self.cycles - 1, -1)
         self.frames = [CallFrame(self.code, self.code.slots(self.arguments))]
         self.context.arm.begin_program()
@@ -260,13 +255,9 @@ class Task:
         """End now."""
         self._unwind()
         self.state, self.word = ProgramState.IDLE, word
-        self._forget()
-        self.context.events.append(ProgramEnded(self.code.program.name, word))
-
-    def _forget(self) -> None:
-        """Watch no signals any more; a DO leaves the paused program's alone."""
-        if self.code.program.name:
+        if self.code.program.name:  # A DO leaves what a paused program watches alone.
             self.context.reactions.clear()
+        self.context.events.append(ProgramEnded(self.code.program.name, word))
 
     def fail(self, error: ValError) -> None:
         """Stand at the present step, for an error."""
@@ -288,7 +279,7 @@ class Task:
         self.state, self.word, self.single = ProgramState.RUNNING, "", single
 
 
-def _resting(context: Context) -> Generator[float, None, Finished]:
+def _resting(context: Context) -> Generator[float, None, Ending]:
     """Wait for the arm to stand, and end."""
     yield from until(context, context.arm.settled)
-    return Finished("END")
+    return Ending("END")

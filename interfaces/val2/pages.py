@@ -146,29 +146,27 @@ class PageTerminal:
             return
         if isinstance(message, PageHello) == self.greeted:
             self.close(_POLICY, "hello comes first, and once")
-        elif isinstance(message, PageHello | Who):
-            self.session, self.holds = message.session, message.holds
-            if isinstance(message, PageHello):
-                self.token, self.greeted = message.token, True
-        elif isinstance(message, ShownCharacters):
-            self._shown = max(self._shown, min(message.size, self._sent))
-        elif self.monitor is not None:
-            self._act(self.monitor, message, now)
-
-    def _act(self, monitor: TerminalMonitor, message: TypedLines | Interrupt | Complete, now: float) -> None:
-        if isinstance(message, Complete):
-            fragment, words = monitor.suggestions(message.text[:LONGEST])
-            listed = [one.word for one in words[:SUGGESTED]]
-            self._answers.append({"type": "completed", "text": message.text, "fragment": fragment, "words": listed})
             return
-        self._prompt = None
-        if isinstance(message, Interrupt):
-            monitor.interrupt(now=now)
-            return
-        for text in message.lines:
-            if not monitor.done:
-                monitor.line(text, now=now)
-                self._collect_output(monitor)
+        monitor = self.monitor
+        match message:
+            case PageHello(token, session, holds):
+                self.token, self.session, self.holds, self.greeted = token, session, holds, True
+            case Who(session, holds):
+                self.session, self.holds = session, holds
+            case ShownCharacters(size):
+                self._shown = max(self._shown, min(size, self._sent))
+            case Complete(text) if monitor is not None:
+                fragment, words = monitor.suggestions(text[:LONGEST])
+                listed = [one.word for one in words[:SUGGESTED]]
+                self._answers.append({"type": "completed", "text": text, "fragment": fragment, "words": listed})
+            case Interrupt() if monitor is not None:
+                self._prompt = None
+                monitor.interrupt(now=now)
+            case TypedLines(lines) if monitor is not None:
+                self._prompt = None
+                for line in lines:
+                    monitor.line(line, now=now)
+                    self._collect_output(monitor)
 
     def advance(self, *, now: float) -> None:
         """Do what is due."""

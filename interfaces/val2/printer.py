@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Final
 
@@ -13,10 +14,9 @@ from interfaces.val2.syntax import (
     Compound,
     Expression,
     Format,
-    Ignored,
+    Instruction,
     Number,
     Program,
-    Statement,
     Step,
     Text,
     Variable,
@@ -86,17 +86,8 @@ def number(value: float) -> str:
 
 def string(value: str) -> tuple[str, int]:
     """The text of a string, with `$CHR` for what can't stand between quotes, and how tightly it binds."""
-    parts: list[str] = []
-    plain = ""
-    for character in value:
-        if character in '"\r\n':
-            parts += [f'"{plain}"'] if plain else []
-            parts.append(f"$CHR({ord(character)})")
-            plain = ""
-        else:
-            plain += character
-    if plain or not parts:
-        parts.append(f'"{plain}"')
+    pieces = [piece for piece in re.split(r'(["\r\n])', value) if piece] or [""]
+    parts = [f"$CHR({ord(piece)})" if piece and piece in '"\r\n' else f'"{piece}"' for piece in pieces]
     return " + ".join(parts), TIGHTEST if len(parts) == 1 else OPERATORS["+"].level
 
 
@@ -136,38 +127,35 @@ def _format(item: Format) -> str:
     return f"/{item.code}{width}" + ("" if item.decimals is None else f".{item.decimals}")
 
 
-def print_statement(statement: Statement) -> str:
+def print_statement(statement: Instruction) -> str:
     """The text of a statement."""
-    if isinstance(statement, Ignored):
-        return f"{statement.keyword} {statement.rest}".rstrip()
+    if statement.passed is not None:
+        return f"{statement.keyword} {statement.passed}".rstrip()
     if statement.begins is not None:
         return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
     keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
-    match keyword, [_item(operand) for operand in statement.operands]:
-        case "=", [target, value]:
-            return f"{target} = {value}"
-        case "SET" | "DECOMPOSE" | "TIMER", [target, value]:
-            return f"{keyword} {target} = {value}"
-        case "PARAMETER", [value]:
-            return f"PARAMETER {words[0]} = {value}"
-        case "IF", [condition, *label]:
-            return f"IF {condition} GOTO {label[0]}" if label else f"IF {condition} THEN"
-        case "WHILE", [condition]:
-            return f"WHILE {condition} DO"
-        case "FOR", [variable, start, stop, *step]:
-            return " ".join([f"FOR {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
-        case "CASE", [value]:
-            return f"CASE {value} OF"
-        case "VALUE", _:
-            return f"VALUE {listed}:"
-        case "CALL" | "GOSUB", given:
+    match STATEMENTS[keyword].rule, [_item(operand) for operand in statement.operands]:
+        case "assignment" | "timing", [target, value]:
+            return f"{keyword} {target} = {value}".removeprefix("= ")
+        case "parameter", [value]:
+            return f"{keyword} {words[0]} = {value}"
+        case "branch", [condition, *label]:
+            return f"{keyword} {condition} " + (f"GOTO {label[0]}" if label else "THEN")
+        case "while", [condition]:
+            return f"{keyword} {condition} DO"
+        case "loop", [variable, start, stop, *step]:
+            return " ".join([f"{keyword} {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
+        case "case", [value]:
+            return f"{keyword} {value} OF"
+        case "values", _:
+            return f"{keyword} {listed}:"
+        case "call", given:
             return f"{keyword} {statement.program}" + (f"({listed})" if given or keyword == "CALL" else "")
-        case "REACT" | "REACTI", [signal]:
-            called = f"{signal}, {statement.program}" if statement.program else signal
-            return " ".join([keyword, called, *words])
-        case "ENABLE" | "DISABLE", _:
+        case "reaction", [signal]:
+            listed = f"{signal}, {statement.program}" if statement.program else signal
+        case "switches", _:
             return f"{keyword} {', '.join(words)}"
-        case "AUTO" | "LOCAL" | "GLOBAL", _:
+        case "names", _:
             return " ".join([keyword, *words, listed])
     return " ".join(filter(None, (keyword, listed, *words)))
 
@@ -187,7 +175,7 @@ def print_program(program: Program) -> str:
     level = 0
     for step in program.steps:
         i = step.statement
-        goes = isinstance(i, Ignored) or (i.keyword == "IF" and len(i.operands) > 1)
+        goes = i.passed is not None or (i.keyword == "IF" and len(i.operands) > 1)
         tags = frozenset[str]() if goes else STATEMENTS[i.keyword].tags
         level = max(level - ("closes" in tags), 0)
         lines.append(_line(step, level))

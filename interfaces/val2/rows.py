@@ -60,6 +60,7 @@ class Form:
         *,
         words: str = "",
         usage: str = "",
+        rule: str = "operands",
         tags: str = "",
         level: int = TIGHTEST,
     ) -> None:
@@ -76,6 +77,8 @@ class Form:
                 of a step; of a monitor command, takes the terminal and what follows the name.
             words: What may stand behind the operands, in their order, one of each group at most: `MMPS|IPS ALWAYS`.
             usage: How it's written, where that isn't told by the slots.
+            rule: What stands behind an instruction's keyword: a rule of `grammar.lark`, or what `statements.py`
+                reads; operands between commas, and words, if nothing is said.
             tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
                 and its name can't be a variable's), `context` (its first argument is the context), `idle` (it's
                 recognised, but has no meaning here: 0, or an empty string); of an instruction `opens`, `closes` (a
@@ -85,6 +88,7 @@ class Form:
         """
         operands, _, gives = spelled.partition("-> ")
         self.name, self.help, self.origin, self.act, self.level = name, explanation, origin, act, level
+        self.rule = rule
         self.tags = frozenset(tags.split())
         self.gives = gives
         """Of a function: a kind, or `truth`."""

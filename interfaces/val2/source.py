@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
@@ -37,6 +37,9 @@ DECIMALS: Final = 9
 """Of lengths [mm] and angles [deg] of transformations: what is read again is printed as it was."""
 _NAME: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)(?:\s*\[([0-9,\s]*)\])?(?=[\s,=]|$)\s*[=,]?\s*")
 _NUMBER: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9]+)?)(?=[\s,]|$)\s*,?\s*")
+_PREFIXES: Final = {".LOCATIONS": ("", "#"), ".REALS": ("",), ".STRINGS": ("$",)}
+"""Of names in the sections of values."""
+_SECTIONS: Final = (*_PREFIXES, ".SIGNALS")
 _ELEMENT: Final = re.compile(r"[0-9]{1,6}")
 
 
@@ -81,86 +84,54 @@ def parse_file(text: str, name: str) -> SourceFile:
 
 def read_file(text: str, name: str) -> Reading[SourceFile]:
     """Read a file in steps, as `parse_file` does at once."""
-    return (yield from _SourceReader(lines_of(text), name).run())
-
-
-class _SourceReader:
-    def __init__(self, lines: Sequence[str], name: str) -> None:
-        self._lines, self._name = lines, name
-        self._programs: list[Program] = []
-        self._entries: dict[str, dict[Variable, Value]] = {".LOCATIONS": {}, ".REALS": {}, ".STRINGS": {}}
-        self._rules: list[SignalRule] = []
-
-    def run(self) -> Reading[SourceFile]:
-        i = 0
-        while i < len(self._lines):
-            yield len(self._lines[i])
-            line = self._lines[i]
-            match directive(line):
-                case ".PROGRAM":
-                    program, i = yield from read_program(self._lines, i)
-                    self._add(program)
-                case ".LOCATIONS" | ".REALS" | ".STRINGS" | ".SIGNALS" as section:
-                    code, _ = split_comment(line, i + 1)
-                    behind = indented(code) + len(section)
-                    if code[behind:].strip():
-                        raise syntax_error(
-                            f"allowed: {section} alone on its line", i + 1, indented(code, behind) + 1
-                        )
-                    i = yield from self._section(section, i + 1)
-                case ".END":
-                    i += 1
-                case "":
-                    i = yield from self._outside(i)
-                case _:
-                    raise unknown_directive(line, i + 1)
-        locations, reals, strings = (
-            tuple(NamedValue(variable, value) for variable, value in entries.items())
-            for entries in self._entries.values()
-        )
-        return SourceFile(self._name, tuple(self._programs), locations, reals, strings, tuple(self._rules))
-
-    def _add(self, program: Program) -> None:
-        if any(program.name == other.name for other in self._programs):
-            raise ValError("Duplicate program", program.name, place=program.at)
-        self._programs.append(program)
-
-    def _outside(self, i: int) -> Reading[int]:
-        """Blank lines and comments between programs; else a program that has no header."""
-        if not split_comment(self._lines[i], i + 1)[0].strip():
-            return i + 1
-        if self._programs:
-            raise syntax_error("allowed: .PROGRAM name(arguments)", i + 1, indented(self._lines[i]) + 1)
-        stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
-        name = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
-        steps, end = yield from read_steps(self._lines, i, name)
-        self._add(Program(name, (), steps, None, TextPosition(i + 1, 1)))
-        return end
-
-    def _section(self, section: str, begin: int) -> Reading[int]:
-        for i in range(begin, len(self._lines)):
-            yield len(self._lines[i])
-            word = directive(self._lines[i])
-            if word:
-                return i + (word == ".END")
-            code, _ = split_comment(self._lines[i], i + 1)
+    lines, i, section = lines_of(text), 0, ""
+    programs: dict[str, Program] = {}
+    entries: dict[str, dict[Variable, Value]] = {word: {} for word in _PREFIXES}
+    rules: list[SignalRule] = []
+    while i < len(lines):
+        yield len(lines[i])
+        word, program, number = directive(lines[i]), None, i + 1
+        code = split_comment(lines[i], number)[0] if word == "" or word in _SECTIONS else ""
+        if word == ".PROGRAM":
+            program, i = yield from read_program(lines, i)
+        elif word == ".END" or word in _SECTIONS:
+            behind = indented(code) + len(word)
+            if code[behind:].strip():
+                raise syntax_error(f"allowed: {word} alone on its line", number, indented(code, behind) + 1)
+            i += 1
+        elif word:
+            raise unknown_directive(lines[i], number)
+        elif not section and code.strip():
+            if programs:
+                raise syntax_error("allowed: .PROGRAM name(arguments)", number, indented(code) + 1)
+            stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(name).stem)
+            called = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
+            steps, i = yield from read_steps(lines, i, called)
+            program = Program(called, (), steps, None, TextPosition(number, 1))
+        else:
             if code.strip() and section == ".SIGNALS":
-                self._rules.append(parse_rule(code, i + 1))
+                rules.append(parse_rule(code, number))
             elif code.strip():
-                variable, value = _ENTRIES[section](code, i + 1)
-                self._entries[section][variable] = value
-        return len(self._lines)
+                variable, value = _entry(section, code, number)
+                entries[section][variable] = value
+            i += 1
+        if word:
+            section = word if word in _SECTIONS else ""
+        if program is not None and programs.setdefault(program.name, program) is not program:
+            raise ValError("Duplicate program", program.name, place=program.at)
+    locations, reals, strings = (tuple(NamedValue(*entry) for entry in given.items()) for given in entries.values())
+    return SourceFile(name, tuple(programs.values()), locations, reals, strings, tuple(rules))
 
 
-def _variable(code: str, line: int, prefixes: str) -> tuple[Variable, int]:
+def _variable(code: str, line: int, prefixes: tuple[str, ...]) -> tuple[Variable, int]:
     """The variable that a line begins with, and where what stands behind it begins."""
     found = _NAME.match(code)
     at = TextPosition(line, indented(code) + 1)
     if found is None:
         raise ValError("Syntax error", "allowed: a name, and its value", place=at)
     prefix = found[1][0] if found[1][0] in "#$" else ""
-    if prefix not in prefixes.split("|"):
-        shown = " or ".join(f"{p}name" for p in prefixes.split("|"))
+    if prefix not in prefixes:
+        shown = " or ".join(f"{p}name" for p in prefixes)
         raise ValError("Syntax error", f"{found[1]}; allowed: {shown}", place=at)
     if found[1].upper() in forms.CONSTANTS:
         raise ValError("Reserved name", f"{found[1].upper()} is a function", place=at)
@@ -189,27 +160,14 @@ def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
     return tuple(values)
 
 
-def _location(code: str, line: int) -> tuple[Variable, Value]:
-    variable, begin = _variable(code, line, "|#")
+def _entry(section: str, code: str, line: int) -> tuple[Variable, Value]:
+    variable, begin = _variable(code, line, _PREFIXES[section])
+    if section == ".STRINGS":
+        tree = grammar.read(" " * begin + code[begin:], "expression", line)
+        return variable, _constant(grammar.expression(tree, line))
+    if section == ".REALS":
+        return variable, _numbers(code, begin, line, 1)[0]
     return variable, location_of(variable, _numbers(code, begin, line, 6))
-
-
-def _real(code: str, line: int) -> tuple[Variable, Value]:
-    variable, begin = _variable(code, line, "")
-    return variable, _numbers(code, begin, line, 1)[0]
-
-
-def _string(code: str, line: int) -> tuple[Variable, Value]:
-    variable, begin = _variable(code, line, "$")
-    tree = grammar.read(" " * begin + code[begin:], "expression", line)
-    return variable, _constant(grammar.expression(tree, line))
-
-
-_ENTRIES: Final[dict[str, Callable[[str, int], tuple[Variable, Value]]]] = {
-    ".LOCATIONS": _location,
-    ".REALS": _real,
-    ".STRINGS": _string,
-}
 
 
 def _constant(expression: Expression) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
@@ -16,10 +16,8 @@ from interfaces.val2.syntax import (
     Apply,
     Compound,
     Expression,
-    Ignored,
     Instruction,
     Number,
-    Statement,
     Text,
     Variable,
     literal,
@@ -199,6 +197,10 @@ class OperandText:
                 raise self.unreadable(f"unexpected {word}; allowed: {row.usage}", at)
         return _given(operands), tuple(ordered)
 
+    def passed_over(self, keyword: str) -> Instruction:
+        """What is recognised but has no meaning here."""
+        return Instruction(keyword, at=self.at, passed=self.text.strip())
+
     def too_many(self, row: Form, extra: Expression | None = None) -> ValError:
         """The error of too many operands, where the first one stands that is too many."""
         return ValError(TOO_MANY, f"allowed: {row.usage}", place=self.end if extra is None else extra.at)
@@ -244,7 +246,7 @@ def as_word(operand: Expression | None) -> str:
     return operand.value.upper() if isinstance(operand, Text) else ""
 
 
-def statement(keyword: str, rest: OperandText) -> Statement:
+def statement(keyword: str, rest: OperandText) -> Instruction:
     """The statement of a keyword, upper case, and what stands behind it.
 
     Raises:
@@ -252,12 +254,11 @@ def statement(keyword: str, rest: OperandText) -> Statement:
     """
     row = forms.INSTRUCTIONS.get(keyword)
     if row is not None:
-        rule = _RULES.get(keyword, _instruction)
-        if isinstance(rule, str):
-            return Instruction(keyword, tuple(_given(rest.by_rule(row, rule))), (), rest.at)
-        return rule(row, rest)
+        if row.rule in _READERS:
+            return _READERS[row.rule](row, rest)
+        return Instruction(keyword, tuple(_given(rest.by_rule(row, row.rule))), (), rest.at)
     if keyword in forms.IGNORED:
-        return Ignored(keyword, rest.text.strip(), rest.at)
+        return rest.passed_over(keyword)
     if rest.text.lstrip().startswith("=="):
         raise rest.unreadable("'==' compares, '=' assigns")
     detail = f"{keyword}{nearest(keyword, forms.INSTRUCTIONS)}"
@@ -266,7 +267,7 @@ def statement(keyword: str, rest: OperandText) -> Statement:
     raise ValError("Undefined instruction", detail, place=rest.at)
 
 
-def assignment(rest: OperandText) -> Statement:
+def assignment(rest: OperandText) -> Instruction:
     """`x = 3`, or a location without SET before it."""
     target, value = rest.by_rule(forms.INSTRUCTIONS["SET"], "assignment")
     match value:
@@ -279,7 +280,7 @@ def assignment(rest: OperandText) -> Statement:
 
 def _instruction(row: Form, rest: OperandText) -> Instruction:
     """Operands between commas, and words behind them."""
-    if row.name in ("ACCEL", "ALTER", "ALTON") and (found := _CHANNEL.match(rest.text)):
+    if row.rule == "channel" and (found := _CHANNEL.match(rest.text)):
         # `ALTER (1) 3` reads like `ALTER 1, 3`.
         channel = found[2] if found[2].strip() or row.name != "ACCEL" else "1"
         rest.text = f"{found[1]} {channel},{found[3]}{rest.text[found.end() :]}"
@@ -310,7 +311,7 @@ def timed(text: str) -> tuple[int, int, int] | None:
     return None if found is None else (found.end(1), found.start(2), found.end(2))
 
 
-def _at(row: Form, rest: OperandText) -> Statement:
+def _at(row: Form, rest: OperandText) -> Instruction:
     """`AT time`, or with a motion behind it."""
     places = timed(rest.text)
     if places is None:
@@ -322,7 +323,7 @@ def _at(row: Form, rest: OperandText) -> Statement:
     return replace(made, begins=grammar.expression(time, rest.line))
 
 
-def _bare(row: Form, rest: OperandText) -> Statement:
+def _bare(row: Form, rest: OperandText) -> Instruction:
     if row.name == "ANY":
         rest.text = rest.text.rstrip().removesuffix(":")
     if not rest.empty:
@@ -330,14 +331,14 @@ def _bare(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, (), (), rest.at)
 
 
-def _shift(row: Form, rest: OperandText) -> Statement:
+def _shift(row: Form, rest: OperandText) -> Instruction:
     target, *way = rest.by_rule(row, "shift")
     if len(way) > 3:
         raise rest.too_many(row)
     return Instruction("SET", (target, Apply("SHIFT", (target, *way), rest.at)), (), rest.at)
 
 
-def _setting(row: Form, rest: OperandText) -> Statement:
+def _setting(row: Form, rest: OperandText) -> Instruction:
     """`PARAMETER name = value`."""
     rest.require(row)
     found = _SETTING.match(rest.text)
@@ -345,14 +346,14 @@ def _setting(row: Form, rest: OperandText) -> Statement:
         raise rest.unreadable(f"allowed: {row.usage}")
     name = found[1].upper()
     if rest.has_strangers([name], "parameter", forms.PARAMETERS):
-        return Ignored(row.name, rest.text.strip(), rest.at)
+        return rest.passed_over(row.name)
     if found[2] is None:
         raise ValError(MISSING, f"allowed: {row.usage}", place=TextPosition(rest.line, found.end() + 1))
     rest.skip(found.end())
     return Instruction(row.name, (rest.expression(),), (name,), rest.at)
 
 
-def _switches(row: Form, rest: OperandText) -> Statement:
+def _switches(row: Form, rest: OperandText) -> Instruction:
     rest.require(row)
     names = []
     for operand, words in rest.operands():
@@ -360,11 +361,11 @@ def _switches(row: Form, rest: OperandText) -> Statement:
         if not isinstance(operand, Variable) or not names[-1] or words:
             raise rest.unreadable(f"allowed: {row.usage}", None if operand is None else operand.at)
     if rest.has_strangers(names, "switch", forms.SWITCHES):
-        return Ignored(row.name, rest.text.strip(), rest.at)
+        return rest.passed_over(row.name)
     return Instruction(row.name, (), tuple(names), rest.at)
 
 
-def _react(row: Form, rest: OperandText) -> Statement:
+def _react(row: Form, rest: OperandText) -> Instruction:
     operands, words = rest.operands_and_words(row)
     rest.count(row, operands[:2])
     if len(operands) > 3:
@@ -381,14 +382,14 @@ def _react(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, (operands[0],), words, rest.at, program=program)
 
 
-def _goto(row: Form, rest: OperandText) -> Statement:
+def _goto(row: Form, rest: OperandText) -> Instruction:
     operands = rest.operands()
     if len(operands) != 1 or operands[0][1]:
         raise ValError(MISSING if rest.empty else "Syntax error", f"allowed: {row.usage}", place=rest.end)
     return Instruction(row.name, (rest.label(operands[0][0]),), (), rest.at)
 
 
-def _value(row: Form, rest: OperandText) -> Statement:
+def _value(row: Form, rest: OperandText) -> Instruction:
     rest.text = rest.text.rstrip().removesuffix(":")
     rest.require(row)
     operands = rest.operands()
@@ -398,7 +399,7 @@ def _value(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, tuple(operand for operand, _ in operands), (), rest.at)
 
 
-def _loops(row: Form, rest: OperandText) -> Statement:
+def _loops(row: Form, rest: OperandText) -> Instruction:
     text = rest.text.strip() or "1"
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(MOST_LOOPS))
     if not plain or not 1 <= int(text) <= MOST_LOOPS:
@@ -406,7 +407,7 @@ def _loops(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, (Number(float(text)),) if int(text) > 1 else (), (), rest.at)
 
 
-def _call(row: Form, rest: OperandText) -> Statement:
+def _call(row: Form, rest: OperandText) -> Instruction:
     rest.require(row)
     name, arguments = rest.tree("call")
     if not _NAME.fullmatch(name):
@@ -421,7 +422,7 @@ def _call(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, tuple(given), (), rest.at, program=grammar.name_of(name))
 
 
-def _prompt(row: Form, rest: OperandText) -> Statement:
+def _prompt(row: Form, rest: OperandText) -> Instruction:
     operands = rest.operands() or [(None, ())]
     text = operands[0][0]
     for operand, words in operands:
@@ -433,7 +434,7 @@ def _prompt(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, (Text("", rest.at) if text is None else text, *targets), (), rest.at)
 
 
-def _local(row: Form, rest: OperandText) -> Statement:
+def _local(row: Form, rest: OperandText) -> Instruction:
     words: tuple[str, ...] = ()
     if found := _KIND.match(rest.text):
         words = ("LOC" if found[1].upper() == "LOC" else "REAL",)
@@ -441,15 +442,9 @@ def _local(row: Form, rest: OperandText) -> Statement:
     return Instruction(row.name, tuple(rest.by_rule(row, "names")), words, rest.at)
 
 
-_RULES: Final[dict[str, str | Callable[[Form, OperandText], Statement]]] = {
-    "SET": "assignment", "DECOMPOSE": "assignment", "TIMER": "timing", "IF": "branch", "WHILE": "while",
-    "UNTIL": "until", "FOR": "loop", "CASE": "case", "TYPE": "items",
-    **dict.fromkeys(("ELSE", "END", "DO", "RETURN", "ANY"), _bare),
-    **dict.fromkeys(("ENABLE", "DISABLE"), _switches),
-    **dict.fromkeys(("REACT", "REACTI"), _react),
-    **dict.fromkeys(("EXIT", "NEXT"), _loops),
-    **dict.fromkeys(("CALL", "GOSUB"), _call),
-    **dict.fromkeys(("AUTO", "LOCAL", "GLOBAL"), _local),
-    "AT": _at, "PARAMETER": _setting, "SHIFT": _shift, "VALUE": _value, "GOTO": _goto, "PROMPT": _prompt,
+_READERS: Final[Mapping[str, Callable[[Form, OperandText], Instruction]]] = {
+    "operands": _instruction, "channel": _instruction, "nothing": _bare, "timed": _at, "shift": _shift,
+    "parameter": _setting, "switches": _switches, "reaction": _react, "goto": _goto, "values": _value,
+    "loops": _loops, "call": _call, "prompt": _prompt, "names": _local,
 }  # fmt: skip
-"""What stands behind keywords where it isn't operands between commas: a rule of the grammar, or what reads it."""
+"""What reads what stands behind a keyword, by the rule of its row, where that isn't a rule of the grammar alone."""

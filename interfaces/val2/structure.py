@@ -11,6 +11,7 @@ from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.syntax import Instruction, Number, Program, Step
 
 BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
+_KINDS: Final = ("IF", "WHILE", "DO", "FOR", "CASE")
 _LOOPS: Final = ("WHILE", "DO", "FOR")
 DEEPEST: Final = 100
 """Most levels of structure."""
@@ -75,15 +76,10 @@ def structure(program: Program) -> Structure:
 
 def survey(program: Program) -> tuple[Structure, list[ValError]]:
     """How the steps of a program belong together, as far as they do, and every error, in the order of steps."""
-    surveyor = _Surveyor(program)
-    surveyor.run()
-    errors = [error for _, error in sorted(surveyor.errors, key=lambda pair: pair[0])]
-    return (
-        Structure(
-            MappingProxyType(surveyor.labels), MappingProxyType(surveyor.jumps), MappingProxyType(surveyor.blocks)
-        ),
-        errors,
-    )
+    found = _Surveyor(program)
+    found.run()
+    errors = [error for _, error in sorted(found.errors, key=lambda pair: pair[0])]
+    return Structure(*map(MappingProxyType, (found.labels, found.jumps, found.blocks))), errors  # type: ignore[arg-type]
 
 
 class _Surveyor:
@@ -114,48 +110,34 @@ class _Surveyor:
 
     def _step(self, i: int, step: Step) -> None:
         match step.statement:
-            case Instruction("IF" | "GRASP", (_, Number(label))):
-                self._goto(i, int(label), step.statement.at)
-            case Instruction("GOTO", (Number(label),), at=at):
+            case Instruction("IF" | "GRASP", (_, Number(label)), at=at) | Instruction(
+                "GOTO", (Number(label),), at=at
+            ):
                 self._goto(i, int(label), at)
-            case Instruction("IF" | "WHILE" | "DO" | "FOR" | "CASE" as keyword):
-                self._begin(keyword, i)
-            case Instruction("ELSE"):
-                self._else(i)
-            case Instruction("VALUE" | "ANY" as keyword):
-                self._value(i, keyword)
+            case Instruction("ELSE" | "VALUE" | "ANY" as keyword):
+                self._divide(i, keyword)
             case Instruction("END" | "UNTIL" as keyword):
                 self._end(i, keyword)
-            case Instruction("EXIT" | "NEXT" as keyword, count):
-                self._loop(i, keyword, int(count[0].value) if count else 1, step.statement.at)
+            case Instruction("EXIT" | "NEXT" as keyword, count, at=at):
+                self._loop(i, keyword, int(count[0].value) if count else 1, at)
             case Instruction(""):
                 pass
-            case _ if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
-                self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
+            case statement:
+                if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
+                    self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
+                if statement.keyword in _KINDS:
+                    if len(self._open) == DEEPEST:
+                        self._fail(i, f"more than {DEEPEST} levels")
+                    self._open.append(_Open(statement.keyword, i))  # type: ignore[arg-type]
 
-    def _begin(self, kind: BlockKind, i: int) -> None:
-        if self._open and self._open[-1].kind == "CASE" and not self._open[-1].arms:
-            self._fail(i, "VALUE is allowed behind CASE, and nothing before it")
-        if len(self._open) == DEEPEST:
-            self._fail(i, f"more than {DEEPEST} levels")
-        self._open.append(_Open(kind, i))
-
-    def _else(self, i: int) -> None:
-        if not self._open or self._open[-1].kind != "IF":
-            self._fail(i, f"ELSE is allowed between IF and END{self._within()}")
+    def _divide(self, i: int, word: str) -> None:
+        kind = "IF" if word == "ELSE" else "CASE"
+        if not self._open or self._open[-1].kind != kind:
+            self._fail(i, f"{word} is allowed between {kind} and END{self._within()}")
         elif self._open[-1].closed:
-            self._fail(i, "a second ELSE")
+            self._fail(i, "a second ELSE" if word == "ELSE" else f"{word} behind ANY")
         else:
-            self._open[-1].closed = True
-            self._open[-1].arms.append(i)
-
-    def _value(self, i: int, word: str) -> None:
-        if not self._open or self._open[-1].kind != "CASE":
-            self._fail(i, f"{word} is allowed between CASE and END{self._within()}")
-        elif self._open[-1].closed:
-            self._fail(i, f"{word} behind ANY")
-        else:
-            self._open[-1].closed = word == "ANY"
+            self._open[-1].closed = word != "VALUE"
             self._open[-1].arms.append(i)
 
     def _within(self) -> str:
@@ -171,15 +153,13 @@ class _Surveyor:
             return
         inner = self._open.pop()
         block = StructureBlock(inner.kind, inner.start, i, tuple(inner.arms))
-        for part in (block.start, *block.arms, i):
-            self.blocks[part] = block
+        self.blocks.update(dict.fromkeys((block.start, *block.arms, i), block))
         match block.kind:
             case "IF":
                 self.jumps[block.start] = (block.arms[0] if block.arms else i) + 1
                 self.jumps.update(dict.fromkeys(block.arms, i + 1))
             case "WHILE" | "FOR":
-                self.jumps[block.start] = i + 1
-                self.jumps[i] = block.start
+                self.jumps |= {block.start: i + 1, i: block.start}
             case "DO":
                 self.jumps[i] = block.start + 1
             case "CASE":
@@ -189,14 +169,11 @@ class _Surveyor:
         self.jumps.update(dict.fromkeys(inner.exits, i + 1))
         self.jumps.update(dict.fromkeys(inner.nexts, i))
 
-    def _loop(self, i: int, word: Literal["EXIT", "NEXT"], count: int, at: TextPosition) -> None:
+    def _loop(self, i: int, word: str, count: int, at: TextPosition) -> None:
         loops = [block for block in self._open if block.kind in _LOOPS]
         if count > len(loops):
-            shown = word if count == 1 else f"{word} {count}"
-            detail = (
-                f"{shown} is allowed within {'a loop' if count == 1 else f'{count} loops'}; here are {len(loops)}"
-            )
-            self._fail(i, detail, at=at)
+            shown, within = (word, "a loop") if count == 1 else (f"{word} {count}", f"{count} loops")
+            self._fail(i, f"{shown} is allowed within {within}; here are {len(loops)}", at=at)
         else:
             (loops[-count].exits if word == "EXIT" else loops[-count].nexts).append(i)
 

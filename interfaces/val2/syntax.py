@@ -128,19 +128,11 @@ class Instruction:
     """Time of `AT time` before a motion, on the same line."""
     program: str = ""
     """What `CALL`, `GOSUB` and `REACT` call; empty for `REACT` that returns from the program that runs."""
+    passed: str | None = None
+    """The rest of the line as it was written, where it's recognised but has no meaning here: it's passed over,
+    with a warning."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ignored:
-    """Something that is recognised but has no meaning here: it's passed over, with a warning."""
-
-    keyword: str
-    rest: str
-    """The rest of the line as it was written."""
-    at: TextPosition = field(default=NOWHERE, compare=False)
-
-
-Statement: TypeAlias = Instruction | Ignored
 BLANK: Final = Instruction("")
 """Nothing, or a comment alone."""
 
@@ -149,7 +141,7 @@ BLANK: Final = Instruction("")
 class Step:
     """A line of a program."""
 
-    statement: Statement
+    statement: Instruction
     label: int | None = None
     """0 to 65535."""
     comment: str | None = None

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from typing_extensions import override
 
-from interfaces.jobs.devices import ArmControl
+from interfaces.jobs import ArmControl
 from interfaces.messages.jobs import ArmJob
 from vrs.model import Array
 

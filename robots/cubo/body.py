@@ -18,7 +18,7 @@ from robots.ipr.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.ipr.position import FusedPosition, TruePosition
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
-from vrs.mobile import clipped
+from vrs.mobile import DriveLimits, clipped
 
 Values = tuple[float, ...]
 BUTTONS: Final = ("service", "message")
@@ -51,6 +51,7 @@ class CuboBody(MobileBody):
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
         senses: Senses | None = None,
+        limits: DriveLimits = p.LIMITS,
         exact: bool = False,
     ) -> None:
         """Put a robot into a room, at rest.
@@ -61,6 +62,7 @@ class CuboBody(MobileBody):
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
             senses: What it senses with; proximity, unless given, and what tells it where it is.
+            limits: What commands must keep to; its own, unless given.
             exact: Whether it knows its posture exactly, instead of by odometry and an overhead camera.
 
         Raises:
@@ -78,7 +80,7 @@ class CuboBody(MobileBody):
         self._touched = False
         self._sounding = 0.0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
-        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
+        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=limits, senses=senses)
         self._position = TruePosition(self) if exact else FusedPosition(self)
         self._posture = self._position.posture()
 

@@ -128,7 +128,7 @@ class Sites:
             [entry for i, entry in plan.ledger.entries.items() if i not in rejected],
             plan.ledger.changes, plan.ledger.versions, plan.ledger.stills, plan.ledger.undo_steps,
             plan.ledger.settled,
-            operator.entries_sent, operator.under_way, operator.new_entries, operator.command_ids,
+            operator.log.count, operator.log.waiting, operator.newest_sent, operator.command_ids,
             operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal.edits),
             [deed for deed in self.notes.deeds if deed.receipt is None or deed.receipt.status != "rejected"],
         ))  # fmt: skip
@@ -141,7 +141,7 @@ class Sites:
         assert self.robot.engine.timeline == self.operator.engine.timeline
         assert self.robot.engine.timeline.end == outcome.receipt.end
         assert self.operator.report is not None
-        assert self.operator.report.executed == self.operator.entries_sent
+        assert self.operator.report.executed == self.operator.log.count
         assert not self.operator.halted
 
 
@@ -318,7 +318,7 @@ def test_a_command_that_no_robot_would_read_isnt_taken() -> None:
         with pytest.raises(InvalidValueError, match=r"at least 2\.23e-308"):
             operator.engine.execute(ParameterChange("qd_max", value))
     assert operator.engine.limits is limits
-    assert operator.entries_sent == 0
+    assert operator.log.count == 0
 
 
 @pytest.mark.parametrize("told", ["commanded", "answered", "reported", "measured"])

@@ -18,10 +18,20 @@ from typer.testing import CliRunner
 from interfaces import connect_mobile
 from interfaces.cli.main import app, exit_status
 from interfaces.lab.driving.run import run
+from interfaces.link import delay_profile
+from interfaces.recording import open_recording
+from interfaces.recording.rerun import rerun
+from interfaces.recording.run_recorders import RunRecorder
+from interfaces.report.html import render
 from interfaces.runs.drive_run import DriveCase
+from interfaces.runs.summary import summarize
+from interfaces.runtime.plan import default_plan
+from interfaces.runtime.session import run_twins
+from robots import Robot
 from tests.interfaces import own_arm, own_base
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import Page, station
+from vrs.model import Array, Limits
 
 HERE = Path(__file__).parent
 ARM, BASE = "tests.interfaces.own_arm:ROBOT", "tests.interfaces.own_base:ROBOT"
@@ -123,7 +133,48 @@ def test_its_recording_says_what_the_run_said(demo: Path, tmp_path: Path) -> Non
     assert last == pytest.approx([0.5, 0.05 - 2e-3, -1.0], abs=1e-6)
 
 
-@pytest.mark.parametrize("arguments", [("compare",), ("replay", "--commands"), ("export", "--report", "r.html")])
+class Snake:
+    """A planar arm of n joints about z."""
+
+    name, prismatic, tool_speed, tool_turn_speed, characteristic_length = "snake", (), 0.5, 1.0, 1.0
+
+    def __init__(self, n: int) -> None:
+        self.limits = Limits(-2.0 * np.ones(n), 2.0 * np.ones(n), np.ones(n), 4.0 * np.ones(n))
+        self.poses: dict[str, Array] = {}
+
+    def links(self, q: Array) -> Array:
+        yaw = np.cumsum(q, axis=-1)
+        X = np.zeros((*yaw.shape, 4, 4)) + np.eye(4)
+        X[..., 0, 0], X[..., 1, 0], X[..., 0, 1], X[..., 1, 1] = np.cos(yaw), np.sin(yaw), -np.sin(yaw), np.cos(yaw)
+        X[..., :2, 3] = np.cumsum(0.1 * X[..., :2, 0], axis=-2)
+        return np.concatenate([np.zeros((*yaw.shape[:-1], 1, 4, 4)) + np.eye(4), X], axis=-3)
+
+    def forward(self, q: Array) -> Array:
+        return self.links(np.asarray(q))[..., -1, :, :]
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 12])
+def test_arms_have_any_number_of_joints(n: int, tmp_path: Path) -> None:
+    snake: Any = Snake(n)
+    robot = Robot("snake", snake)
+    recorder = RunRecorder(tmp_path / "run.mcap")
+    played = run_twins(default_plan(snake), robot, delay_profile("mon"), seed=1, keeper=recorder)
+    recorder.finish()
+    assert played.q_real.shape[1] == n
+    figures = summarize(played)
+    assert len(figures["errors"]["servo"]["joint_rms_deg"]) == n
+    assert figures["path"]["progress"] > 0.99
+    assert f'id="plot-joint-{n}"' in render(played, figures)
+    assert f'id="plot-joint-{n + 1}"' not in render(played, figures)
+    with open_recording(recorder.path, robot) as recording:
+        assert rerun(recording).identical
+        assert recording.real(2.0).shape == (n,)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("compare",), ("compare", "--robot", "puma560"), ("replay", "--commands"), ("export", "--report", "r.html")],
+)
 def test_without_the_robot_its_recording_says_what_is_missing(
     demo: Path, arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -178,6 +229,7 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
         (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
         (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
         (("console", "--robot", ARM), "an arm of 6 joints that turn"),
+        (("serve", "--robot", "micro", "--camera", "3"), "micro has nothing of the kind"),
         (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
         (("lab", "--robot", ARM, "--out", "."), "a mobile robot; this one is an arm"),
         (("demo", "--robot", "tests.interfaces.own_arm:Crane"), "a Robot there (ROBOT)"),

@@ -27,8 +27,10 @@ from interfaces.messages.jobs import (
 from interfaces.messages.mobile import Tasks
 from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
 from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
-from interfaces.runtime.live.robot import LiveRobot
+from interfaces.runtime.live.physics_body import PhysicsBody
+from interfaces.runtime.live.robot import LiveBody, LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
+from interfaces.runtime.physics import PhysicsConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
@@ -40,6 +42,7 @@ from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal, JourneyState
+from robots.robot import EXACT
 from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
@@ -51,23 +54,29 @@ HERE, THERE = Goal(1.5, 3.0), Goal(2.3, 3.0)
 
 
 @asynccontextmanager
+async def listening(robot: LiveRobot) -> AsyncIterator[str]:
+    """A robot's site in this loop, and its URL."""
+    at = sockets.bind("127.0.0.1", 0)
+    port = at.getsockname()[1]
+    app = application(robot.routes, hosts(["127.0.0.1"], port))
+    async with sockets.serve(app, at, largest=LARGEST), robot.running():
+        yield f"ws://127.0.0.1:{port}/site"
+
+
+@asynccontextmanager
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
-    robot_at, at = (sockets.bind("127.0.0.1", 0) for _ in range(2))
     config = PacedConfig(ROBOT, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
-    robot = LiveRobot(PacedBody(config), Access(free={Role.SITE}))
-    port, own = robot_at.getsockname()[1], at.getsockname()[1]
-    operator = LiveMobileOperator(
-        LiveMobileOperatorConfig(ROBOT, ROOM, f"ws://127.0.0.1:{port}/site", LinkConditions(), jobs=JobFile(jobs)),
-        Access(free=OPEN),
-    )
-    async with (
-        sockets.serve(application(robot.routes, hosts(["127.0.0.1"], port)), robot_at, largest=LARGEST),
-        robot.running(),
-        sockets.serve(application(operator.routes, hosts(["127.0.0.1"], own)), at),
-        operator.running(),
-    ):
-        yield Serving(own)
+    async with listening(LiveRobot(PacedBody(config), Access(free={Role.SITE}))) as url:
+        at = sockets.bind("127.0.0.1", 0)
+        own = at.getsockname()[1]
+        operator = LiveMobileOperator(
+            LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions(), jobs=JobFile(jobs)),
+            Access(free=OPEN),
+        )
+        app = application(operator.routes, hosts(["127.0.0.1"], own))
+        async with sockets.serve(app, at), operator.running():
+            yield Serving(own)
 
 
 def met(url: str, name: str) -> MobileConnection:
@@ -148,7 +157,7 @@ def test_a_robot_whose_body_fails_says_so_and_ends(
         raise OSError("no such wheel")
 
     async def run() -> None:
-        body = PacedBody(PacedConfig(EMPTY))
+        body = PacedBody(PacedConfig(ROBOT, EMPTY))
         robot = LiveRobot(body, Access(free={Role.SITE}))
         async with robot.running(), asyncio.timeout(20.0):
             await robot.ready()
@@ -161,6 +170,32 @@ def test_a_robot_whose_body_fails_says_so_and_ends(
 
     asyncio.run(run())
     assert [record.message for record in caplog.records] == ["the body failed"]
+
+
+@pytest.mark.parametrize("other", ["arm", "room"])
+def test_an_operator_takes_no_other_robot_and_no_other_room(other: str) -> None:
+    async def run() -> str:
+        body: LiveBody
+        if other == "room":
+            body = PacedBody(PacedConfig(ROBOT, place("lane")))
+        else:
+            arm = load("puma560")
+            body = PhysicsBody(PhysicsConfig(arm, arm.arm.poses["ready"], EXACT))
+        async with listening(LiveRobot(body, Access(free={Role.SITE}))) as url:
+            config = LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions())
+            async with LiveMobileOperator(config, Access(free=OPEN)).running() as operator, asyncio.timeout(20.0):
+                while "driven here" not in operator.robot.problem:
+                    await asyncio.sleep(0.02)
+                assert not operator.robot.connected
+                return operator.robot.problem
+
+    assert (
+        asyncio.run(run()).removeprefix("not the robot that is driven here: ")
+        == {
+            "arm": "it's a puma560, and this site drives an ipr",
+            "room": f"its room is {place('lane').name!r}, and this site has {ROOM.name!r}: give both one",
+        }[other]
+    )
 
 
 def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:

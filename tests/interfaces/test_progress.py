@@ -137,9 +137,9 @@ def test_an_outage_while_somebody_steers_is_no_halt(delay, service):
         lab.run(lab.now + 3.0 + 0.213 * k)
         lab.link.change(up, lab.now)
         end = lab.now + 60.0
-        while lab.now < end and (report is None or report.executed < lab.operator.entries_sent):
+        while lab.now < end and (report is None or report.executed < lab.operator.log.count):
             lab.run(lab.now + 1.0)
             report = lab.operator.report
         assert not lab.operator.halted
         assert report is not None
-        assert report.executed == lab.operator.entries_sent == 50 * (k + 1)
+        assert report.executed == lab.operator.log.count == 50 * (k + 1)

@@ -297,6 +297,34 @@ def test_entries_that_nobody_acknowledges_are_sent_again() -> None:
     assert 1.0 <= operator.config.beat * again <= 1.2
 
 
+def test_of_more_lost_entries_than_a_message_takes_each_has_its_turn() -> None:
+    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
+    for k in range(100):
+        operator.execute(MotionCommand(JointTarget(NOMINAL + 0.001 * k)), now=0.0)
+    again: set[int] = set()
+    operator.advance(now=operator.next_deadline())
+    for _ in range(30):
+        (orders,) = operator.advance(now=operator.next_deadline())
+        assert len(orders.entries) <= operator.config.resent + operator.config.repeat
+        again |= {entry.number for entry in orders.entries}
+    assert again == set(range(1, 101))
+
+
+def test_what_was_under_way_to_a_robot_that_halted_isnt_expected_of_it() -> None:
+    lab = laboratory("constant:0.2", 4, length=0.0)
+    operator, robot = lab.operator, lab.robot
+    lab.run(1.0)
+    operator.execute(MotionCommand(JointTarget(NOMINAL + 0.3)), now=1.0)
+    robot.halt("somebody pulled the plug", now=1.0)
+    lab.run(1.3)
+    assert operator.halted
+    sent = [entry for orders in operator.advance(now=operator.next_deadline()) for entry in orders.entries]
+    assert not sent
+    lab.run(6.0)
+    assert _apart(lab) < 1e-9
+    assert np.abs(operator.engine.joints(lab.now) - NOMINAL).max() < 1e-9
+
+
 def test_an_arm_that_has_stopped_may_be_held_elsewhere() -> None:
     robot = RobotSite(MODEL, NOMINAL, now=0.0)
     robot.halt("somebody pulled the plug", now=1.0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table, above, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, interval_name, median
@@ -39,27 +39,6 @@ SOURCE: Final = f"Section VII, (e); {OWN_BAR}"
 CASES: Final = ("late", "blocked", "lossless", "lossy")
 
 
-class AgreementResult(NamedTuple):
-    """One run."""
-
-    agreed: float
-    """From the last command, or the block, until the timelines agree for good [s]; infinite where they don't."""
-    noticed: float
-    """Until the virtual robot was first corrected after it [s]; infinite where it wasn't."""
-    corrections: tuple[float, ...]
-    """Largest error of a joint at the beginning of each [rad]."""
-    durations: tuple[float, ...]
-    """Of each [s]."""
-    unlinked: float
-    """How far they are apart at the end where nothing comes back [rad]."""
-    limits: float
-    """Largest speed or acceleration of the virtual robot, corrections included, as a share of its limit."""
-    t: Array
-    """From the last command or the block on [s]."""
-    apart: Array
-    """Of the timelines then, and from then on [rad]."""
-
-
 def apart(mine: Timeline, other: Timeline, now: float) -> float:
     """Largest difference of two timelines' joints from now on [rad]."""
     t = np.arange(now, max(mine.end, other.end, now) + 1.0, 0.02)
@@ -81,7 +60,8 @@ def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
     return float(agreed), np.array(t), np.array(gaps)
 
 
-def _seen(lab: Laboratory, since: float, unlinked: float) -> AgreementResult:
+def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Results:
+    """What is seen from some time on; `unlinked` is the virtual robot's timeline where nothing comes back."""
     agreed, t, gaps = _watch(lab, since)
     made: list[Correction] = lab.operator.corrections
     after = [c.t - since for c in made if c.t >= since]
@@ -91,15 +71,15 @@ def _seen(lab: Laboratory, since: float, unlinked: float) -> AgreementResult:
         np.abs(timeline.sample(grid, derivative=k) / top).max()
         for k, top in ((1, limits.qd_max), (2, limits.qdd_max))
     ]
-    return AgreementResult(
-        agreed,
-        min(after, default=np.inf),
-        tuple(float(np.abs(c.error).max()) for c in made),
-        tuple(c.end - c.t for c in made),
-        unlinked,
-        float(max(used)),
-        t,
-        gaps,
+    return Results(
+        agreed=agreed,  # until the timelines agree for good [s]; infinite where they don't
+        noticed=min(after, default=np.inf),  # until the virtual robot was corrected [s]; infinite where it wasn't
+        corrections=tuple(float(np.abs(c.error).max()) for c in made),  # largest error of a joint at each [rad]
+        durations=tuple(c.end - c.t for c in made),  # of each [s]
+        unlinked=apart(unlinked, lab.robot.engine.timeline, lab.now),  # how far the two are apart at the end [rad]
+        limits=float(max(used)),  # largest speed or acceleration, corrections included, as a share of its limit
+        t=t,  # from then on [s]
+        apart=gaps,  # how far the timelines are apart at t, and from then on [rad]
     )
 
 
@@ -120,18 +100,16 @@ def _give(lab: Laboratory, acts: tuple[Act, ...]) -> float:
     return max(act.t for act in acts)
 
 
-def talk(seed: int, length: float, way: Conditions, D: float | None) -> AgreementResult:
+def talk(seed: int, length: float, way: Conditions, D: float | None) -> Results:
     """Commands for some seconds, then quiet."""
     acts = script(np.random.default_rng((seed, 20)), length)
     lab = _lab(seed, way, D)
     last = _give(lab, acts)
     lab.run(last)
-    seen = _seen(lab, last, 0.0)
-    plain = replay(acts).timeline
-    return seen._replace(unlinked=apart(plain, lab.robot.engine.timeline, lab.now))
+    return _seen(lab, last, replay(acts).timeline)
 
 
-def block(seed: int) -> AgreementResult:
+def block(seed: int) -> Results:
     """The real arm is held in the middle of a move."""
     rng = np.random.default_rng((seed, 22))
     lab = _lab(seed, Conditions(delay=ConstantDelay("constant", DELAY)), None)
@@ -144,12 +122,10 @@ def block(seed: int) -> AgreementResult:
     _, reference = played(lab)
     held = reference.q[-1] + 0.5 * (HOME - reference.q[-1])
     lab.robot.measured(held, now=lab.now)
-    before = lab.operator.engine.timeline
-    seen = _seen(lab, lab.now, 0.0)
-    return seen._replace(unlinked=apart(before, lab.robot.engine.timeline, lab.now))
+    return _seen(lab, lab.now, lab.operator.engine.timeline)
 
 
-def work(study: Study, case: str) -> list[AgreementResult]:
+def work(study: Study, case: str) -> list[Results]:
     """Measure a case for every seed."""
     seeds = range(study.seed + 700, study.seed + 700 + study.runs)
     length = min(study.length, 15.0)
@@ -163,7 +139,7 @@ def work(study: Study, case: str) -> list[AgreementResult]:
 
 def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     """How soon they agree, and by how much the virtual robot was corrected."""
-    cases: dict[str, list[AgreementResult]] = dict(zip(CASES, found, strict=True))
+    cases: dict[str, list[Results]] = dict(zip(CASES, found, strict=True))
     claims: list[Claim] = []
     names = {
         "late": f"commands late by {DELAY + SHORT:g} s at the robot",
@@ -177,81 +153,39 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
         finite = bool(np.isfinite(agreed).all())
         middle = bootstrap(agreed, study.seed, median) if finite else None
         since = "the block" if case == "blocked" else "the last command"
-        claims.append(
-            Claim(
-                f"{names[case]}: timelines agree to 1e-9 rad after {since}, at most [s]",
-                SOURCE,
-                f"≤ {LIMIT:g}",
-                max(agreed),
-                max(agreed) <= LIMIT,
-            )
-        )
+        text = f"{names[case]}: timelines agree to 1e-9 rad after {since}, at most [s]"
+        claims.append(at_most(text, SOURCE, LIMIT, max(agreed)))
+        sizes = [size for s in seen for size in s.corrections]
+        spans = [span for s in seen for span in s.durations]
         if case in {"late", "blocked"}:
             # Late commands may by chance lead to where they lead in time; a block is always in the way.
             end, extreme = ("at most", max) if case == "late" else ("at least", min)
-            parted = extreme(s.unlinked for s in seen)
-            claims.append(
-                Claim(
-                    f"{names[case]}, no direct link: the timelines stay apart, by {end} [rad]",
-                    SOURCE,
-                    "> 1e-9",
-                    parted,
-                    parted > AGREE,
-                )
-            )
-        sizes = [size for s in seen for size in s.corrections]
-        spans = [span for s in seen for span in s.durations]
-        limits = max(s.limits for s in seen)
-        if case in {"late", "blocked"}:
-            claims.append(
-                Claim(
-                    f"{names[case]}: limits of the virtual robot, corrections included, as a share",
-                    SOURCE,
-                    "≤ 1",
-                    limits,
-                    limits <= 1 + 1e-9,
-                )
-            )
+            text = f"{names[case]}, no direct link: the timelines stay apart, by {end} [rad]"
+            claims.append(above(text, SOURCE, AGREE, extreme(s.unlinked for s in seen)))
+            text = f"{names[case]}: limits of the virtual robot, corrections included, as a share"
+            claims.append(at_most(text, SOURCE, 1, max(s.limits for s in seen), slack=1e-9))
         else:
-            claims.append(
-                Claim(f"{names[case]}: corrections of the virtual robot", SOURCE, 0, len(sizes), not sizes)
-            )
+            claims.append(none_of(f"{names[case]}: corrections of the virtual robot", SOURCE, len(sizes)))
         rows.append(
             (
-                names[case],
-                None if middle is None else middle.value,
-                None if middle is None else f"{middle.low:.2f} to {middle.high:.2f}",
-                max(agreed),
-                len(sizes),
-                float(np.degrees(np.mean(sizes))) if sizes else None,
-                float(np.degrees(max(sizes))) if sizes else None,
-                float(np.mean(spans)) if spans else None,
-                max(spans) if spans else None,
+                ("what", names[case]),
+                ("agree after s, median", None if middle is None else middle.value),
+                (
+                    interval_name(study.runs, of_median=True),
+                    None if middle is None else f"{middle.low:.2f} to {middle.high:.2f}",
+                ),
+                ("max", max(agreed)),
+                ("corrections", len(sizes)),
+                ("size deg, mean", float(np.degrees(np.mean(sizes))) if sizes else None),
+                ("max", float(np.degrees(max(sizes))) if sizes else None),
+                ("lasts s, mean", float(np.mean(spans)) if spans else None),
+                ("max", max(spans) if spans else None),
             )
         )
     noticed = [s.noticed for s in cases["blocked"]]
-    beats = DELAY + 2 * 0.05
-    claims.append(
-        Claim(
-            "the virtual robot turns to where the blocked one is after [s], at most: the way back and two beats",
-            SOURCE,
-            f"≤ {beats:g}",
-            max(noticed),
-            max(noticed) <= beats + 1e-6,
-        )
-    )
-    columns = (
-        "what",
-        "agree after s, median",
-        interval_name(study.runs, of_median=True),
-        "max",
-        "corrections",
-        "size deg, mean",
-        "max",
-        "lasts s, mean",
-        "max",
-    )
-    table = Table("agreement", f"(e) virtual and real, {DELAY} s each way; {study.runs} runs", columns, tuple(rows))
+    text = "the virtual robot turns to where the blocked one is after [s], at most: the way back and two beats"
+    claims.append(at_most(text, SOURCE, DELAY + 2 * 0.05, max(noticed), slack=1e-6))
+    table = Table.of("agreement", f"(e) virtual and real, {DELAY} s each way; {study.runs} runs", rows)
     picture = draw(
         "e-agreement",
         "(e) how far the timelines of the virtual and the real robot are apart",
@@ -260,7 +194,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     return Findings(tuple(claims), (table,), (picture,))
 
 
-def _paint(canvas: Canvas, cases: dict[str, list[AgreementResult]]) -> None:
+def _paint(canvas: Canvas, cases: dict[str, list[Results]]) -> None:
     axes = canvas.subplots(1, 2, sharey=True)
     titles = ("after the last of some late commands", "after the real arm was blocked")
     for ax, case, title in zip(axes, ("late", "blocked"), titles, strict=True):

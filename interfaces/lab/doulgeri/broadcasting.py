@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.broadcast import Broadcaster
-from interfaces.lab.claims import Claim, Findings, Study, Table
-from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, target
+from interfaces.lab.claims import Claim, Findings, Study, Table, at_most
+from interfaces.lab.doulgeri.script import HOME, MODEL, PortLog, ScriptedSite, target
 from interfaces.lab.output import REAL, VIRTUAL, draw
-from interfaces.messages import Broadcast, Reply, ViewForm
+from interfaces.messages import ViewForm
 from vrs import Engine, ManualClock, MotionCommand, WallClock
 
 if TYPE_CHECKING:
@@ -30,32 +28,17 @@ TIMED: Final = 2000
 SECTION: Final = "Section VI-B"
 
 
-class Arrivals:
-    """When frames come by a port."""
-
-    def __init__(self, port: RemotePort) -> None:
-        self.times: list[float] = []
-        self.numbers: list[int] = []
-        port.join(self)
-
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Note a frame."""
-        if isinstance(message, Broadcast):
-            self.times.append(now)
-            self.numbers.append(message.frame.number)
-
-
 def work(study: Study, _case: str) -> Findings:
     """All rates at once, on one engine that moves; then the time that a frame takes."""
     rng = np.random.default_rng((study.seed, 4))
     joined = ScriptedSite(0.0)
     broadcasters = [joined.site.broadcast(rate) for rate in RATES]
-    taps: dict[int, list[Arrivals]] = {rate: [] for rate in RATES}
+    taps: dict[int, list[PortLog]] = {rate: [] for rate in RATES}
     for rate in RATES:
         for _ in range(VIEWERS):
             port = joined.connect(DELAY, DELAY)
             joined.add(Viewer(port, rate=rate, form=ViewForm.FRAMES))
-            taps[rate].append(Arrivals(port))
+            taps[rate].append(PortLog(port))
     designer = Designer(joined.connect(DELAY, DELAY))
     joined.add(designer)
     begin, length = 1.0, min(study.length, 10.0)
@@ -64,49 +47,36 @@ def work(study: Study, _case: str) -> Findings:
         designer.issue(MotionCommand(target(rng)), now=joined.now)
     joined.run(begin + length + 1.0)
 
-    claims, rows, gaps = [], [], {}
+    claims, rows = [], []
+    delivered: dict[int, int] = {}
+    gaps: dict[int, np.ndarray] = {}
     for rate, broadcaster in zip(RATES, broadcasters, strict=True):
         made = broadcaster.number
-        missing = [count_missing(tap.numbers) for tap in taps[rate]]
-        gaps[rate] = np.concatenate([np.diff(tap.times) for tap in taps[rate]])
-        delivered = min(len(tap.times) for tap in taps[rate])
-        counted = sum(missing) == 0 and broadcaster.skipped == 0 and delivered >= rate * length
+        missing = [count_missing([frame.number for frame, _ in tap.frames]) for tap in taps[rate]]
+        gaps[rate] = np.concatenate([np.diff([came for _, came in tap.frames]) for tap in taps[rate]])
+        delivered[rate] = min(len(tap.frames) for tap in taps[rate])
+        counted = sum(missing) == 0 and broadcaster.skipped == 0 and delivered[rate] >= rate * length
         even = float(np.abs(gaps[rate] - 1.0 / rate).max())
         rows.append(
-            (rate, VIEWERS, made, delivered, sum(missing), float(gaps[rate].mean()), float(gaps[rate].max()))
-        )
-        claims.append(
-            Claim(
-                f"{rate} frames a second to {VIEWERS} viewers, beside other rates: missing or skipped",
-                SECTION,
-                0,
-                sum(missing) + broadcaster.skipped,
-                counted,
+            (
+                ("frames a second", rate),
+                ("viewers", VIEWERS),
+                ("frames made", made),
+                ("delivered to each, least", delivered[rate]),
+                ("missing", sum(missing)),
+                ("interval, mean s", float(gaps[rate].mean())),
+                ("largest s", float(gaps[rate].max())),
             )
         )
-        claims.append(
-            Claim(
-                f"{rate} frames a second: interval between frames at the viewers off by at most [s]",
-                SECTION,
-                "≤ 1e-6",
-                even,
-                even <= 1e-6,
-            )
-        )
-    columns = (
-        "frames a second",
-        "viewers",
-        "frames made",
-        "delivered to each, least",
-        "missing",
-        "interval, mean s",
-        "largest s",
-    )
-    table = Table("broadcasters", "Six broadcasters at once on one engine", columns, tuple(rows))
+        text = f"{rate} frames a second to {VIEWERS} viewers, beside other rates: missing or skipped"
+        claims.append(Claim(text, SECTION, 0, sum(missing) + broadcaster.skipped, counted))
+        text = f"{rate} frames a second: interval between frames at the viewers off by at most [s]"
+        claims.append(at_most(text, SECTION, 1e-6, even))
+    table = Table.of("broadcasters", "Six broadcasters at once on one engine", rows)
     picture = draw(
         "broadcasters",
         "Frames at the viewers, six broadcasters on one engine",
-        lambda canvas: _paint(canvas, rows, gaps),
+        lambda canvas: _paint(canvas, delivered, gaps),
     )
     return Findings(tuple(claims), (table,), (picture,), load())
 
@@ -135,31 +105,29 @@ def load() -> tuple[Claim, ...]:
         clock.set((k + 1) / 50.0)
     cost = float(np.median(costs))
     return (
-        Claim(
-            f"a frame for {VIEWERS} viewers costs the server [s], median", SECTION, "≤ 0.002", cost, cost <= 0.002
-        ),
-        Claim(
+        at_most(f"a frame for {VIEWERS} viewers costs the server [s], median", SECTION, 0.002, cost),
+        at_most(
             "50 frames a second take of one processor, a share",
             SECTION,
-            "≤ 0.1: no serious overload",
+            0.1,
             50 * cost,
-            50 * cost <= 0.1,
+            note=": no serious overload",
         ),
     )
 
 
-def _paint(canvas: Canvas, rows: Sequence[tuple[float, ...]], gaps: dict[int, np.ndarray]) -> None:
+def _paint(canvas: Canvas, delivered: dict[int, int], gaps: dict[int, np.ndarray]) -> None:
     left, right = canvas.subplots(1, 2)
-    x = np.arange(len(rows))
-    left.bar(x, [row[3] for row in rows], 0.6, color=VIRTUAL)
-    left.set_xticks(x, [str(row[0]) for row in rows])
+    x = np.arange(len(delivered))
+    left.bar(x, list(delivered.values()), 0.6, color=VIRTUAL)
+    left.set_xticks(x, [str(rate) for rate in delivered])
     left.set_title("frames delivered to each viewer")
     left.grid(visible=False, axis="x")
-    right.plot(x, [1e3 / row[0] for row in rows], color=VIRTUAL, marker="_", markersize=16, linestyle="none")
-    for k, row in enumerate(rows):
-        times = 1e3 * gaps[int(row[0])]
+    right.plot(x, [1e3 / rate for rate in delivered], color=VIRTUAL, marker="_", markersize=16, linestyle="none")
+    for k, rate in enumerate(delivered):
+        times = 1e3 * gaps[rate]
         right.plot([k, k], [times.min(), times.max()], "o", color=REAL, markersize=3.5)
-    right.set_xticks(x, [str(row[0]) for row in rows])
+    right.set_xticks(x, [str(rate) for rate in delivered])
     right.set_ylim(bottom=0.0)
     right.set_title("interval, ms: asked (–), measured (•)")
     for ax in (left, right):

@@ -104,56 +104,34 @@ def work(study: Study, _case: str) -> Findings:
     claims = [
         Claim(
             "t_exec < t_iss: commands rejected",
-            f"{II_C}, 1)",
-            f"{asked} of {asked}",
-            f"{rejected} of {asked}",
-            rejected == asked,
+            f"{II_C}, 1)", f"{asked} of {asked}", f"{rejected} of {asked}", rejected == asked,
         ),
         Claim(
             "a command for the past, policy postpone: begins after the end of the active segment by [s]",
-            f"{II_C}, 2)",
-            0.0,
-            "never" if at is None else at - end,
+            f"{II_C}, 2)", 0.0, "never" if at is None else at - end,
             postponed.status is Status.POSTPONED and at is not None and abs(at - end) <= 1e-9,
         ),
         Claim(
             "the same, policy reject",
-            f"{II_C}, 2)",
-            "rejected",
-            str(aborted.status),
-            aborted.status is Status.REJECTED,
+            f"{II_C}, 2)", "rejected", str(aborted.status), aborted.status is Status.REJECTED,
         ),
         Claim(
             "the past stays as it was: largest change [rad]",
-            f"{II_C}, 2)",
-            0.0,
-            max(past, untouched),
-            max(past, untouched) == 0.0,
+            f"{II_C}, 2)", 0.0, max(past, untouched), max(past, untouched) == 0.0,
         ),
-    ]
+    ]  # fmt: skip
     for k, (D, name) in enumerate(((0.0, "0"), (-D_F, "−D_f"), (D_B, "+D_b"))):
         counted = [over_a_link(D, study.seed + 1000 * k + run, study.length) for run in range(study.runs)]
         total, right = sum(c[2] for c in counted), sum(c[1] for c in counted)
-        claims.append(
-            Claim(
-                f"D = {name}: commands are in time exactly if t_exec ≥ t_iss + D_f + D; told rightly, of {total}",
-                f"{IV}, IV-A",
-                total,
-                right,
-                right == total and sum(c[0] for c in counted) > 0,
-            )
-        )
+        text = f"D = {name}: commands are in time exactly if t_exec ≥ t_iss + D_f + D; told rightly, of {total}"
+        holds = right == total and sum(c[0] for c in counted) > 0
+        claims.append(Claim(text, f"{IV}, IV-A", total, right, holds))
     for D, name in ((-D_F, "−D_f"), (0.0, "0")):
         seen = [both_sites(D, study.seed + 5000 + run, study.length) for run in range(study.runs)]
         here, there, total = (sum(s[i] for s in seen) for i in range(3))
         wanted = "none at either end" if D else "none at the operator's end, some at the robot's"
-        claims.append(
-            Claim(
-                f"the same commands at the operator's virtual robot and at the real one, D = {name}: postponed",
-                f"{IV}, V",
-                wanted,
-                f"{here} there, {there} at the robot, of {total}",
-                here == 0 and (there == 0 if D else there > 0) and total > 0,
-            )
-        )
+        text = f"the same commands at the operator's virtual robot and at the real one, D = {name}: postponed"
+        found = f"{here} there, {there} at the robot, of {total}"
+        holds = here == 0 and (there == 0 if D else there > 0) and total > 0
+        claims.append(Claim(text, f"{IV}, V", wanted, found, holds))
     return Findings(tuple(claims))

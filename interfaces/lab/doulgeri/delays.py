@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.clients.ports import RemotePort
-from interfaces.lab.claims import Claim, Findings, Study, Table
-from interfaces.lab.doulgeri.script import ScriptedSite, arrivals, target
+from interfaces.lab.claims import Cell, Claim, Findings, Results, Study, Table, at_most
+from interfaces.lab.doulgeri.script import PortLog, ScriptedSite, arrivals, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
-from interfaces.messages import Broadcast, FrameStatus, Outcome, Reply, ViewForm
+from interfaces.messages import Frame, FrameStatus, ViewForm
 from vrs import MotionCommand
 from vrs.checks import one_of
 
@@ -62,58 +61,14 @@ SETTINGS: Final = {
 CASES: Final = (*SETTINGS, "leads")
 
 
-class DelayResult(NamedTuple):
-    """One run."""
-
-    lateness: tuple[float, ...]
-    """How late each command was when it came to the engine [s]."""
-    postponed: float
-    """Share of commands that were."""
-    ages: tuple[float, float, float]
-    """Of frames when they came, by the user's clock: least, mean, largest [s]."""
-    shown: float
-    """Largest age of a frame when it was shown [s]."""
-    falsified: float
-    """Share of the frames."""
-    foretold: float
-    """Share of the frames in whose lead a command was carried out."""
-
-
-class LinkTraffic(NamedTuple):
-    """What crossed the link, for the timing diagrams; users' time but where it says otherwise [s]."""
-
-    commands: tuple[tuple[float, float], ...]
-    """Issued; and the engine's time when it came."""
-    frames: tuple[tuple[float, float, float], ...]
-    """The engine's time when it was made, the time it shows, and when it came."""
-
-
-class Tap:
-    """Writes down what comes by a port."""
-
-    def __init__(self, port: RemotePort) -> None:
-        self.frames: list[tuple[float, float, float]] = []
-        self.numbers: list[int] = []
-        self.outcomes: dict[int, float] = {}
-        port.join(self)
-
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Note when it was made, and when it came [s]."""
-        if isinstance(message, Broadcast):
-            self.frames.append((message.frame.made_at, message.frame.t, now))
-            self.numbers.append(message.frame.number)
-        elif isinstance(message, Outcome):
-            self.outcomes.setdefault(message.number, message.made_at)
-
-
-def run(setting: OffsetSetting, seed: int, length: float) -> tuple[DelayResult, LinkTraffic]:
+def run(setting: OffsetSetting, seed: int, length: float) -> Results:
     """Commands that come at random, each to be carried out at once, over constant delays."""
     rng = np.random.default_rng(seed)
     joined = ScriptedSite(setting.D)
     broadcaster = joined.site.broadcast(RATE, lead=setting.lead)
     port = joined.connect(D_F, D_B)
     designer, viewer = Designer(port), Viewer(port, rate=RATE, form=ViewForm.FRAMES)
-    tap = Tap(port)
+    log = PortLog(port)
     joined.add(designer)
     joined.add(viewer)
     joined.run(1.0)
@@ -122,35 +77,36 @@ def run(setting: OffsetSetting, seed: int, length: float) -> tuple[DelayResult, 
         joined.run(float(t))
         designer.issue(MotionCommand(target(rng), speed=0.3), now=joined.now, execute_in=0.0)
     joined.run(1.0 + length + 3.0)
-    late = [tap.outcomes[i.number] - i.issued_at for i in designer.history]
     postponed = [i.receipt is not None and i.late > 0 for i in designer.history]
     began = np.array(
         [i.receipt.execute_at for i in designer.history if i.receipt is not None and i.receipt.q is not None]
     )
-    ages = np.array([came - shows for _, shows, came in tap.frames])
+    ages = np.array([at - frame.t for frame, at in log.frames])
     # While commands come: before and after there's nothing that could falsify.
-    busy = [i for i, frame in enumerate(tap.frames) if 1.0 + setting.lead <= frame[1] - setting.D <= 1.0 + length]
-    verdicts = [broadcaster.status(tap.numbers[i]) for i in busy]
-    share = float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts]))
-    seen = DelayResult(
-        tuple(late),
-        float(np.mean(postponed)) if postponed else 0.0,
-        (float(ages.min()), float(ages.mean()), float(ages.max())),
-        max(shown.age for shown in viewer.history),
-        share,
-        foretold([tap.frames[i] for i in busy], began),
-    )
-    return seen, LinkTraffic(
-        tuple(zip(issued.tolist(), (tap.outcomes[i.number] for i in designer.history), strict=True)),
-        tuple(tap.frames),
+    busy = [f for f, _ in log.frames if 1.0 + setting.lead <= f.t - setting.D <= 1.0 + length]
+    verdicts = [broadcaster.status(frame.number) for frame in busy]
+    made = [log.outcomes[i.number].made_at for i in designer.history]  # engine's time when each command came [s]
+    return Results(
+        # How late each command was when it came to the engine [s].
+        lateness=tuple(there - i.issued_at for there, i in zip(made, designer.history, strict=True)),
+        postponed=float(np.mean(postponed)) if postponed else 0.0,  # share of commands that were
+        # Of frames when they came, by the user's clock: least, mean, largest [s].
+        ages=(float(ages.min()), float(ages.mean()), float(ages.max())),
+        shown=max(shown.age for shown in viewer.history),  # largest age of a frame when it was shown [s]
+        falsified=float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts])),  # share
+        foretold=foretold(busy, began),  # share of the frames in whose lead a command was carried out
+        # For the timing diagrams: the users' time when a command was issued, the engine's when it came [s].
+        commands=tuple(zip(issued.tolist(), made, strict=True)),
+        # And the engine's time when a frame was made, the time it shows, and the users' when it came [s].
+        frames=tuple((frame.made_at, frame.t, at) for frame, at in log.frames),
     )
 
 
-def foretold(frames: list[tuple[float, float, float]], began: np.ndarray) -> float:
+def foretold(frames: list[Frame], began: np.ndarray) -> float:
     """Share of frames with a motion that began after they were made and before the time that they show."""
     if not len(frames):
         return 0.0
-    made, shows, _ = np.array(frames).T
+    made, shows = np.array([(frame.made_at, frame.t) for frame in frames]).T
     hits = np.searchsorted(began, shows - 1e-4) > np.searchsorted(began, made)
     return float(hits.mean())
 
@@ -169,48 +125,29 @@ def leads(seed: int, length: float) -> tuple[float, ...]:
     return tuple(broadcaster.share_falsified or 0.0 for broadcaster in broadcasters)
 
 
-def work(study: Study, case: str) -> object:
+def work(study: Study, case: str) -> list[Any]:
     """Measure a setting, or all leads."""
     if case == "leads":
         return [leads(study.seed + 300 + k, study.length) for k in range(study.runs)]
     setting = SETTINGS[one_of("case", case, CASES)]
-    found = [run(setting, study.seed + k, study.length) for k in range(study.runs)]
-    return [seen for seen, _ in found], found[0][1]
+    return [run(setting, study.seed + k, study.length) for k in range(study.runs)]
 
 
-def conclude(study: Study, found: tuple[object, ...]) -> Findings:
+def conclude(study: Study, found: tuple[list[Any], ...]) -> Findings:
     """Compare with what the paper's formulas say."""
     claims: list[Claim] = []
     rows = []
-    diagrams = []
-    for case, result in zip(SETTINGS, found, strict=False):
-        setting = SETTINGS[case]
-        seen, sent = cast("tuple[list[DelayResult], LinkTraffic]", result)
+    for setting, seen in zip(SETTINGS.values(), found, strict=False):
         claims += delay_claims(study, setting, seen)
         rows.append(_row(study, setting, seen))
-        diagrams.append((setting, sent))
     shares = np.array(found[-1])
     claims += lead_claims(study, shares)
-    columns = (
-        "clock",
-        "lateness, paper s",
-        "measured s",
-        "postponed %",
-        "age, paper s",
-        "measured s",
-        "shown at most s",
-        "falsified %",
-        interval_name(study.runs),
-        "foretold by commands %",
-    )
-    table = Table(
-        "delays", f"Figs 4 to 6: D_f = {D_F} s, D_b = {D_B} s, {COMMANDS:g} commands a second", columns, tuple(rows)
-    )
+    title = f"Figs 4 to 6: D_f = {D_F} s, D_b = {D_B} s, {COMMANDS:g} commands a second"
     pictures = (
         draw(
             "figs4-6-timing",
             "Figs 4 to 6, from a run: a command and a frame under each clock offset",
-            lambda canvas: _paint(canvas, diagrams),
+            lambda canvas: _paint(canvas, [runs[0] for runs in found[:-1]]),
             height=7.0,
         ),
         draw(
@@ -219,10 +156,10 @@ def conclude(study: Study, found: tuple[object, ...]) -> Findings:
             lambda canvas: _paint_leads(canvas, study, shares),
         ),
     )
-    return Findings(tuple(claims), (table,), pictures)
+    return Findings(tuple(claims), (Table.of("delays", title, rows),), pictures)
 
 
-def delay_claims(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> list[Claim]:
+def delay_claims(study: Study, setting: OffsetSetting, seen: list[Results]) -> list[Claim]:
     """What must hold of the runs at one setting of the offset."""
     late = np.concatenate([s.lateness for s in seen])
     off = float(np.abs(late - setting.lateness).max())
@@ -232,98 +169,63 @@ def delay_claims(study: Study, setting: OffsetSetting, seen: list[DelayResult]) 
     claims = [
         Claim(
             f"{setting.title}: commands to be carried out at once come late by [s]",
-            setting.source,
-            setting.lateness,
-            float(late.mean()),
-            off <= NANOSECONDS,
+            setting.source, setting.lateness, float(late.mean()), off <= NANOSECONDS,
         ),
         Claim(
             f"{setting.title}: age of frames by the user's clock when they come [s]",
-            setting.source,
-            setting.age,
-            age,
-            aged,
+            setting.source, setting.age, age, aged,
         ),
-    ]
+    ]  # fmt: skip
     if setting.lateness == 0:
         most = max(s.postponed for s in seen)
         claims.append(Claim(f"{setting.title}: share of commands postponed", setting.source, 0.0, most, most == 0))
     share = bootstrap([s.falsified for s in seen], study.seed)
     if setting.lead:
         gap = max(abs(s.falsified - s.foretold) for s in seen)
-        claims.append(
-            Claim(
-                "predicted frames are false exactly where a command is executed between t_c and t_c + D_f + D_b: "
-                "largest difference of both shares in a run",
-                setting.source,
-                "≤ 0.01",
-                gap,
-                gap <= 0.01,
-            )
+        text = (
+            "predicted frames are false exactly where a command is executed between t_c and t_c + D_f + D_b: "
+            "largest difference of both shares in a run"
         )
-        claims.append(
-            Claim(
-                f"share of predicted frames falsified, {COMMANDS:g} commands/s: 1 − exp(−rate · lead)",
-                setting.source,
-                -float(np.expm1(-COMMANDS * setting.lead)),
-                share.value,
-                _equals(share, -float(np.expm1(-COMMANDS * setting.lead))),
-                share.interval,
-            )
-        )
+        claims.append(at_most(text, setting.source, 0.01, gap))
+        text = f"share of predicted frames falsified, {COMMANDS:g} commands/s: 1 − exp(−rate · lead)"
+        claims.append(_share_claim(text, setting.source, setting.lead, share))
     else:
-        claims.append(
-            Claim(
-                f"{setting.title}: share of frames falsified, none being predicted",
-                setting.source,
-                0.0,
-                share.value,
-                share.value == 0,
-            )
-        )
+        text = f"{setting.title}: share of frames falsified, none being predicted"
+        claims.append(Claim(text, setting.source, 0.0, share.value, share.value == 0))
     return claims
 
 
-def _equals(share: Estimate, expected: float) -> bool:
-    """Whether the interval holds what's expected, or both are within 10 %: then they're called equal."""
-    return share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
+def _share_claim(text: str, source: str, lead: float, share: Estimate) -> Claim:
+    """It holds if the interval holds what's expected, or both are within 10 %: then they're called equal."""
+    expected = -float(np.expm1(-COMMANDS * lead))
+    equal = share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
+    return Claim(text, source, expected, share.value, equal, share.interval)
 
 
-def _row(study: Study, setting: OffsetSetting, seen: list[DelayResult]) -> tuple[float | str, ...]:
+def _row(study: Study, setting: OffsetSetting, seen: list[Results]) -> tuple[tuple[str, Cell], ...]:
     late = np.concatenate([s.lateness for s in seen])
     share = bootstrap([100 * s.falsified for s in seen], study.seed)
     return (
-        setting.title,
-        setting.lateness,
-        float(late.mean()),
-        100 * float(np.mean([s.postponed for s in seen])),
-        setting.age,
-        float(np.mean([s.ages[1] for s in seen])),
-        max(s.shown for s in seen),
-        share.value,
-        f"{share.low:.1f} to {share.high:.1f}",
-        100 * float(np.mean([s.foretold for s in seen])) if setting.lead else 0.0,
+        ("clock", setting.title),
+        ("lateness, paper s", setting.lateness),
+        ("measured s", float(late.mean())),
+        ("postponed %", 100 * float(np.mean([s.postponed for s in seen]))),
+        ("age, paper s", setting.age),
+        ("measured s", float(np.mean([s.ages[1] for s in seen]))),
+        ("shown at most s", max(s.shown for s in seen)),
+        ("falsified %", share.value),
+        (interval_name(study.runs), f"{share.low:.1f} to {share.high:.1f}"),
+        ("foretold by commands %", 100 * float(np.mean([s.foretold for s in seen])) if setting.lead else 0.0),
     )
 
 
 def lead_claims(study: Study, shares: np.ndarray) -> list[Claim]:
     """What must hold of the shares of predicted frames that were falsified; shares: (runs, leads)."""
-    claims = []
-    for k in (1, 4, 6):
-        lead = LEADS[k]
-        share = bootstrap(shares[:, k], study.seed)
-        expected = -float(np.expm1(-COMMANDS * lead))
-        claims.append(
-            Claim(
-                f"frames {lead:g} s ahead, {COMMANDS:g} commands/s: share falsified, 1 − exp(−rate · lead)",
-                "Section IV-A",
-                expected,
-                share.value,
-                _equals(share, expected),
-                share.interval,
-            )
-        )
-    return claims
+    text = "frames {:g} s ahead, {:g} commands/s: share falsified, 1 − exp(−rate · lead)"
+    return [
+        _share_claim(text.format(LEADS[k], COMMANDS), "Section IV-A", LEADS[k], bootstrap(shares[:, k], study.seed))
+        for k in (1, 4, 6)
+    ]
 
 
 def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
@@ -349,14 +251,14 @@ def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
     legend(ax, place="upper left")
 
 
-def _paint(canvas: Canvas, diagrams: list[tuple[OffsetSetting, LinkTraffic]]) -> None:
-    rows = canvas.subplots(len(diagrams), 1, sharex=True)
-    for ax, (setting, sent) in zip(rows, diagrams, strict=True):
+def _paint(canvas: Canvas, first: list[Results]) -> None:
+    rows = canvas.subplots(len(first), 1, sharex=True)
+    for ax, setting, sent in zip(rows, SETTINGS.values(), first, strict=True):
         _timing(ax, setting, sent)
     rows[-1].set_xlabel("time from the issue of the command, s")
 
 
-def _timing(ax: Axes, setting: OffsetSetting, sent: LinkTraffic) -> None:
+def _timing(ax: Axes, setting: OffsetSetting, sent: Results) -> None:
     """A command from the user's line to the engine's, and a frame back; each line has its own clock."""
     issued, came = sent.commands[0]
     arrived = came - setting.D - issued

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 import numpy as np
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal, changed
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Findings, Results, Study, Table, above, at_least, at_most
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, arrivals, target, tool
 from interfaces.lab.output import GOOD, MUTED, REAL, VIRTUAL, draw
 from interfaces.lab.statistics import bootstrap
@@ -41,57 +41,24 @@ NAMES: Final = {
 }
 
 
-class Sizes(NamedTuple):
-    """Of one motion, in bytes a second; and what the reader gets wrong."""
+def sent_compact(messages: list[tuple[Compact, Timeline]]) -> tuple[float, float, float]:
+    """What compact frames cost by the bytes that a server sends, and what their reader gets wrong.
 
-    frames: float
-    """Number, time and six joints, 50 times a second, as float64."""
-    frames_single: float
-    """The same as float32: half the digits."""
-    segments: float
-    """Edits with the segments that they put in, and pulses."""
-    commands: float
-    """What the operator said; the reader needs an engine."""
-    between: float
-    """Largest tool error of frames joined by straight lines in the joints [m]."""
-    rebuilt: float
-    """Largest error of the joints that the segments' reader has [rad]."""
-    compact: float
-    """Compact frames as they cross, all that a message holds, six to one: the first of them comes 0.1 s later."""
-    compact_each: float
-    """The same, one to a message."""
-    absolute: float
-    """The same as `compact`, quantised, but not predicted."""
-    compact_error: float
-    """Largest error of the joints that their readers have [rad]."""
+    Args:
+        messages: In their order, each with the timeline whose g its frames should be.
 
-
-class CompactFollower:
-    """Follows a broadcaster's compact frames, by the bytes that a server would send, and counts them."""
-
-    def __init__(self, source: Broadcaster, delay: float) -> None:
-        self._slot, self._decoder = source.join_compact(delay), CompactDecoder()
-        self._bytes = self._absolute = 0
-        self._count = 0
-        self.error = 0.0
-        """Largest error of a joint so far [rad]."""
-
-    def take(self, timeline: Timeline) -> None:
-        """Take what is sent now; g of the timeline is what it should be."""
-        message = self._slot.take()
-        if message is None:
-            return
-        self._bytes += len(encode(message, Encoding.MSGPACK))
-        frames = [broadcast.frame for broadcast in self._decoder.receive(message)]
-        self._absolute += absolute(frames)
-        self._count += len(frames)
+    Returns:
+        Bytes a second; what they would be without prediction; largest error of a joint [rad].
+    """
+    decoder, size, bare, count, error = CompactDecoder(), 0, 0, 0, 0.0
+    for message, timeline in messages:
+        frames = [broadcast.frame for broadcast in decoder.receive(message)]
+        size += len(encode(message, Encoding.MSGPACK))
+        bare += absolute(frames)
+        count += len(frames)
         g = timeline.sample(np.array([frame.t for frame in frames]))
-        self.error = max(self.error, float(np.abs(np.array([frame.q for frame in frames]) - g).max()))
-
-    def rates(self) -> tuple[float, float]:
-        """Bytes a second, and what they would be without prediction."""
-        seconds = self._count / RATE
-        return self._bytes / seconds, self._absolute / seconds
+        error = max(error, float(np.abs(np.array([frame.q for frame in frames]) - g).max()))
+    return size / (count / RATE), bare / (count / RATE), error
 
 
 def absolute(frames: list[Frame]) -> int:
@@ -148,7 +115,7 @@ def acts(kind: str, rng: np.random.Generator, length: float) -> list[Act]:
     return found
 
 
-def measure(kind: str, seed: int, length: float) -> Sizes:
+def measure(kind: str, seed: int, length: float) -> Results:
     """One run: an engine does it, a reader rebuilds it from the bytes."""
     rng = np.random.default_rng((seed, 7))
     clock = ManualClock(0.0)
@@ -158,7 +125,8 @@ def measure(kind: str, seed: int, length: float) -> Sizes:
     size = {"segments": 0, "commands": 0}
     t = np.arange(int(length * RATE) + 1) / RATE
     source = Broadcaster(journal, rate=RATE)
-    several, each = CompactFollower(source, LONGEST_DELAY), CompactFollower(source, 0.0)
+    slots = source.join_compact(LONGEST_DELAY), source.join_compact(0.0)
+    sent: tuple[list[tuple[Compact, Timeline]], ...] = ([], [])
     coming = deque(acts(kind, rng, length))
     for now in t.tolist():
         while coming and coming[0].t <= now:
@@ -174,9 +142,10 @@ def measure(kind: str, seed: int, length: float) -> Sizes:
                 reader = changed(reader, decoded(data))
         clock.set(now)
         source.advance(now=now)
-        for follower in (several, each):
-            follower.take(engine.timeline)
-    compact, bare = several.rates()
+        for slot, messages in zip(slots, sent, strict=True):
+            if (message := slot.take()) is not None:
+                messages.append((message, engine.timeline))
+    (several, bare, error), (each, _, error_each) = (sent_compact(messages) for messages in sent)
     pulse = len(msgspec.msgpack.encode((journal.number, length, length)))
     frame = msgspec.msgpack.encode((int(length * RATE), length, HOME.tolist()))
     # msgpack marks a float32 and a float64 with one byte each.
@@ -185,17 +154,19 @@ def measure(kind: str, seed: int, length: float) -> Sizes:
     middle = engine.timeline.sample(0.5 * (t[1:] + t[:-1]))
     straight = 0.5 * (frames[1:] + frames[:-1])
     dense = np.linspace(0.0, length, int(200 * length))
-    return Sizes(
-        RATE * len(frame),
-        RATE * single,
-        size["segments"] / length + pulse / PULSE,
-        size["commands"] / length,
-        float(np.linalg.norm(tool(middle) - tool(straight), axis=1).max()),
-        float(np.abs(engine.timeline.sample(dense) - reader.sample(dense)).max()),
-        compact,
-        each.rates()[0],
-        bare,
-        max(several.error, each.error),
+    return Results(
+        frames=RATE * len(frame),  # number, time and six joints, 50 times a second, as float64 [B/s]
+        frames_single=RATE * single,  # the same as float32: half the digits
+        segments=size["segments"] / length + pulse / PULSE,  # edits with what they put in, and pulses [B/s]
+        commands=size["commands"] / length,  # what the operator said; the reader needs an engine [B/s]
+        compact=several,  # all that a message holds, six frames to one: the first comes 0.1 s later [B/s]
+        compact_each=each,  # one frame to a message
+        absolute=bare,  # as `compact`, quantised, but not predicted
+        # Largest error of the tool in frames joined by straight lines in the joints [m].
+        between=float(np.linalg.norm(tool(middle) - tool(straight), axis=1).max()),
+        # Largest error of the joints that the segments' reader has, and that of compact frames [rad].
+        rebuilt=float(np.abs(engine.timeline.sample(dense) - reader.sample(dense)).max()),
+        compact_error=max(error, error_each),
     )
 
 
@@ -212,101 +183,80 @@ def _said(act: Act) -> tuple[Any, ...]:
     return (2, act.t, command.target.q.tolist(), command.execute_at, command.speed, *words)
 
 
-def work(study: Study, case: str) -> list[Sizes]:
+def work(study: Study, case: str) -> list[Results]:
     """Measure one kind of motion; a hand's, which costs more, for a shorter time and in fewer runs."""
     moves = case == "moves"
     runs, length = (study.runs, study.length) if moves else (min(study.runs, 3), min(study.length, 4.0))
     return [measure(case, study.seed + k, length) for k in range(runs)]
 
 
-def conclude(study: Study, found: tuple[list[Sizes], ...]) -> Findings:
+def conclude(study: Study, found: tuple[list[Results], ...]) -> Findings:
     """Compare bytes."""
-    claims, rows = [], []
+    claims, means, rows = [], [], []
     for kind, sizes in zip(MOTIONS, found, strict=True):
         better = [min(s.segments, s.compact) for s in sizes]
-        for name, least, ratios in (
-            (
-                "the better of segments and compact frames",
-                "> 1.1",
-                [s.frames / b for s, b in zip(sizes, better, strict=True)],
-            ),
-            (
-                "commands, where the reader has an engine",
-                "> 1.1" if kind == "moves" else "≥ 0.9: no more than frames",
-                [s.frames / s.commands for s in sizes],
-            ),
-        ):
-            ratio = bootstrap(ratios, study.seed)
-            holds = ratio.low > 1.1 if least == "> 1.1" else ratio.low >= 0.9
-            text = f"{NAMES[kind]}: bytes of frames at 50 a second over bytes of {name}"
-            claims.append(Claim(text, SOURCE, least, ratio.value, holds, ratio.interval))
+        name = f"{NAMES[kind]}: bytes of frames at 50 a second over bytes of"
+        ratio = bootstrap([s.frames / b for s, b in zip(sizes, better, strict=True)], study.seed)
+        claims.append(above(f"{name} the better of segments and compact frames", SOURCE, 1.1, ratio))
+        ratio = bootstrap([s.frames / s.commands for s in sizes], study.seed)
+        text = f"{name} commands, where the reader has an engine"
+        claims.append(
+            above(text, SOURCE, 1.1, ratio)
+            if kind == "moves"
+            else at_least(text, SOURCE, 0.9, ratio, note=": no more than frames")
+        )
         cost = bootstrap(better, study.seed)
         text = f"{NAMES[kind]}: the better of segments and compact frames, six in a message, costs [B/s]"
-        bar = f"≤ {SKETCH:g}, the least of an independent sketch"
-        claims.append(Claim(text, SOURCE, bar, cost.value, cost.high <= SKETCH, cost.interval))
-        for who, least, error, most in (
-            ("who has the segments has the joints at every time", "≤ 1e-12", max(s.rebuilt for s in sizes), 1e-12),
-            ("who gets compact frames has their joints", "≤ 1e-5", max(s.compact_error for s in sizes), QUANTISED),
-        ):
-            text = f"{NAMES[kind]}: {who}, off by at most [rad]"
-            claims.append(Claim(text, SOURCE, least, error, error <= most))
-        mean = Sizes(*(float(np.mean(column)) for column in zip(*sizes, strict=True)))
-        worst = max(s.between for s in sizes)
+        claims.append(at_most(text, SOURCE, SKETCH, cost, note=", the least of an independent sketch"))
+        rebuilt, off = max(s.rebuilt for s in sizes), max(s.compact_error for s in sizes)
+        text = f"{NAMES[kind]}: who has the segments has the joints at every time, off by at most [rad]"
+        claims.append(at_most(text, SOURCE, 1e-12, rebuilt))
+        text = f"{NAMES[kind]}: who gets compact frames has their joints, off by at most [rad]"
+        claims.append(at_most(text, SOURCE, QUANTISED, off))
+        mean = Results(**{what: float(np.mean([vars(s)[what] for s in sizes])) for what in vars(sizes[0])})
+        means.append(mean)
         rows.append(
             (
-                NAMES[kind],
-                mean.frames,
-                mean.frames_single,
-                mean.absolute,
-                mean.compact_each,
-                mean.compact,
-                mean.segments,
-                mean.commands,
-                1e3 * worst,
-                max(s.rebuilt for s in sizes),
-                max(s.compact_error for s in sizes),
+                ("motion", NAMES[kind]),
+                ("frames B/s", mean.frames),
+                ("as float32", mean.frames_single),
+                ("quantised, six in a message", mean.absolute),
+                ("compact, one in a message", mean.compact_each),
+                ("compact, six in a message", mean.compact),
+                ("segments B/s", mean.segments),
+                ("commands B/s", mean.commands),
+                ("between frames, tool mm", 1e3 * max(s.between for s in sizes)),
+                ("segments, joints rad", rebuilt),
+                ("compact, joints rad", off),
             )
         )
-    columns = (
-        "motion",
-        "frames B/s",
-        "as float32",
-        "quantised, six in a message",
-        "compact, one in a message",
-        "compact, six in a message",
-        "segments B/s",
-        "commands B/s",
-        "between frames, tool mm",
-        "segments, joints rad",
-        "compact, joints rad",
-    )
     title = "(b) msgpack of the values, no names; of compact frames all that crosses"
-    table = Table("encoding", title, columns, tuple(rows))
+    table = Table.of("encoding", title, rows)
     picture = draw(
-        "b-encoding", "(b) bytes a second for the same motion", lambda canvas: _paint(canvas, rows), height=3.2
+        "b-encoding", "(b) bytes a second for the same motion", lambda canvas: _paint(canvas, means), height=3.2
     )
     return Findings(tuple(claims), (table,), (picture,))
 
 
-def _paint(canvas: Canvas, rows: list[tuple[Any, ...]]) -> None:
+def _paint(canvas: Canvas, means: list[Results]) -> None:
     ax = canvas.add_subplot()
-    y = np.arange(len(rows))[::-1]
+    y = np.arange(len(means))[::-1]
     bars = (
-        (0.3, 1, MUTED, "frames, 50 a second"),
-        (0.1, 5, GOOD, "compact frames"),
-        (-0.1, 6, VIRTUAL, "segments"),
-        (-0.3, 7, REAL, "commands"),
+        (0.3, "frames", MUTED, "frames, 50 a second"),
+        (0.1, "compact", GOOD, "compact frames"),
+        (-0.1, "segments", VIRTUAL, "segments"),
+        (-0.3, "commands", REAL, "commands"),
     )
-    for shift, column, colour, name in bars:
-        values = np.array([row[column] for row in rows])
+    for shift, what, colour, name in bars:
+        values = np.array([getattr(mean, what) for mean in means])
         ax.barh(y + shift, values, 0.18, color=colour, label=name)
         for place, value in zip(y + shift, values, strict=True):
             ax.annotate(
                 f"{value:,.0f}", (value, place), (3, 0), textcoords="offset points", va="center", fontsize=8
             )
-    ax.set_yticks(y, [row[0].replace(", ", ",\n") for row in rows])
+    ax.set_yticks(y, [NAMES[kind].replace(", ", ",\n") for kind in MOTIONS])
     ax.set_xscale("log")
-    ax.set_xlim(right=6 * max(max(row[1:8]) for row in rows))
+    ax.set_xlim(right=6 * max(max(vars(mean).values()) for mean in means))
     ax.set_xlabel("bytes a second (logarithmic)")
     ax.grid(visible=False, axis="y")
     ax.legend(loc="upper right", fontsize=8)

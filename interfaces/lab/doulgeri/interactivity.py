@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from interfaces import Designer, Viewer
 from interfaces.clients.playhead import FASTEST, QUICKEST, Mode
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table, at_most
 from interfaces.lab.doulgeri.agreement import AGREE, apart
 from interfaces.lab.doulgeri.script import HOME, ScriptedSite, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
@@ -105,23 +105,7 @@ def edits(rng: np.random.Generator) -> dict[str, float]:
     return shown
 
 
-class Scrubbed(NamedTuple):
-    """One who goes through time while the robot moves."""
-
-    seek: dict[ViewForm, float]
-    """From a jump to the first frame of that time [s]."""
-    dragged: float
-    """How far the place of one who paused in the past moved while commands came [s]."""
-    live: tuple[float, float, float]
-    """The gap; how long going live took; how long is promised [s]."""
-    others: float
-    """Largest change of another viewer's age [s]."""
-    t: tuple[float, ...]
-    place: tuple[float, ...]
-    """Of the viewer of segments [s]."""
-
-
-def scrub(rng: np.random.Generator) -> Scrubbed:
+def scrub(rng: np.random.Generator) -> Results:
     """Seek, pause and go live, while commands come."""
     session = InteractiveSession()
     for _ in range(8):
@@ -153,13 +137,13 @@ def scrub(rng: np.random.Generator) -> Scrubbed:
     session.joined.run(session.now + 1.0)
     ages = [shown.age for shown in session.other.history if shown.shown_at > 2.0]
     seen = [shown for shown in viewer.history if shown.shown_at >= begin - 1.0]
-    return Scrubbed(
-        seek,
-        dragged,
-        (gap, took, promised),
-        float(np.ptp(ages)),
-        tuple(s.shown_at - begin for s in seen),
-        tuple(s.t - begin for s in seen),
+    return Results(
+        seek=seek,  # by form: from a jump to the first frame of that time [s]
+        dragged=dragged,  # how far the place of one who paused in the past moved while commands came [s]
+        live=(gap, took, promised),  # the gap; how long going live took; how long is promised [s]
+        others=float(np.ptp(ages)),  # largest change of another viewer's age [s]
+        t=tuple(s.shown_at - begin for s in seen),  # [s]
+        place=tuple(s.t - begin for s in seen),  # of the viewer of segments [s]
     )
 
 
@@ -172,6 +156,7 @@ def work(study: Study, _case: str) -> Findings:
         shown.append(session.move(rng, 0.0))
         session.joined.run(session.now + 0.6)
     path = D_F + D_B
+    shows = path + STEP
     slowest, quickest = max(shown), min(shown)
     edited, seen = edits(rng), scrub(rng)
     done = sum(np.isfinite(seconds) for seconds in edited.values())
@@ -181,68 +166,35 @@ def work(study: Study, _case: str) -> Findings:
     claims = (
         Claim(
             "from a command to the committed path that it makes, at a viewer of segments, at most [s]",
-            SOURCE,
-            f"≤ D_f + D_b + {STEP:g} = {path + STEP:g}",
-            slowest,
-            path - OVER <= quickest and slowest <= path + STEP + OVER,
+            SOURCE, f"≤ D_f + D_b + {STEP:g} = {shows:g}", slowest,
+            path - OVER <= quickest and slowest <= shows + OVER,
         ),
         Claim(
             f"edits of a motion under way that are carried out and shown: {', '.join(EDITS)}",
-            SOURCE,
-            f"{len(EDITS)} of {len(EDITS)}",
-            f"{done} of {len(EDITS)}",
-            done == len(EDITS),
+            SOURCE, f"{len(EDITS)} of {len(EDITS)}", f"{done} of {len(EDITS)}", done == len(EDITS),
         ),
-        Claim(
-            "an edit shows after [s], at most",
-            SOURCE,
-            f"≤ {path + STEP:g}",
-            max(edited.values()),
-            max(edited.values()) <= path + STEP + OVER,
-        ),
-        Claim(
-            "undo while live shows after [s]",
-            SOURCE,
-            f"≤ {path + STEP:g}",
-            edited["undo"],
-            edited["undo"] <= path + STEP + OVER,
-        ),
-        Claim(
+        at_most("an edit shows after [s], at most", SOURCE, shows, max(edited.values()), slack=OVER),
+        at_most("undo while live shows after [s]", SOURCE, shows, edited["undo"], slack=OVER),
+        at_most(
             "a jump to another time, segments: first frame of it after [s]",
-            SOURCE,
-            f"≤ {period:g}, a frame",
-            seen.seek[ViewForm.SEGMENTS],
-            seen.seek[ViewForm.SEGMENTS] <= period + OVER,
+            SOURCE, period, seen.seek[ViewForm.SEGMENTS], slack=OVER, note=", a frame",
         ),
-        Claim(
+        at_most(
             "a jump to another time, frames: first frame of it after [s]",
-            SOURCE,
-            f"≤ {path + 2 * period:g}, a round trip and two frames",
-            seen.seek[ViewForm.FRAMES],
-            seen.seek[ViewForm.FRAMES] <= path + 2 * period + OVER,
+            SOURCE, path + 2 * period, seen.seek[ViewForm.FRAMES], slack=OVER, note=", a round trip and two frames",
         ),
         Claim(
             "who paused in the past isn't dragged to live by commands: moved by [s]",
-            SOURCE,
-            0.0,
-            seen.dragged,
-            seen.dragged <= OVER,
+            SOURCE, 0.0, seen.dragged, seen.dragged <= OVER,
         ),
         Claim(
-            f"going live from {gap:.2f} s back takes [s]",
-            "docs/interfaces.md",
-            law,
-            took,
+            f"going live from {gap:.2f} s back takes [s]", "docs/interfaces.md", law, took,
             abs(promised - law) <= 0.1 * law and abs(took - promised) <= period + STEP + OVER,
         ),
-        Claim(
-            "meanwhile another viewer's frames keep their age, to [s]",
-            SOURCE,
-            f"≤ {period:g}",
-            seen.others,
-            seen.others <= period + OVER,
+        at_most(
+            "meanwhile another viewer's frames keep their age, to [s]", SOURCE, period, seen.others, slack=OVER
         ),
-    )
+    )  # fmt: skip
     rows = tuple((name, seconds) for name, seconds in (("a move", slowest), *edited.items()))
     table = Table(
         "interactivity",
@@ -259,7 +211,7 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(claims, (table,), (picture,))
 
 
-def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Scrubbed) -> None:
+def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Results) -> None:
     left, right = canvas.subplots(1, 2, width_ratios=(1.0, 1.4))
     y = np.arange(len(rows))[::-1]
     left.barh(y, [1e3 * row[1] for row in rows], 0.6, color=VIRTUAL)

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import (
+    OWN_BAR,
+    Cell,
+    Findings,
+    Results,
+    Study,
+    Table,
+    above,
+    at_least,
+    at_most,
+    below_zero,
+    none_of,
+)
 from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
 from interfaces.lab.output import MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, clustered, interval_name
@@ -37,47 +49,8 @@ OVER: Final = 1e-9
 SOURCE: Final = f"Section VII, (a); {OWN_BAR}"
 
 
-class JitterResult(NamedTuple):
-    """One run with one way of choosing the offset."""
-
-    mean: float
-    """Path error of the tool over time [m], METRICS."""
-    p95: float
-    largest: float
-    time_difference: float
-    """Mean, over the path that both robots took [s]."""
-    time_difference_max: float
-    progress: float
-    """Share of the path reached."""
-    aside: float
-    """Largest distance of the real tool from the virtual one at the same time on the timeline [m]."""
-    bursts: int
-    limits: float
-    """Largest speed or acceleration, as a share of its limit."""
-    pace: float
-    """Fastest that the timeline was played."""
-    postponed: int
-    """Moves that began later at the robot than on the virtual robot."""
-    moves: int
-    corrections: int
-    """Of the virtual robot, by the real one."""
-
-
-class Trace(NamedTuple):
-    """Of one run, for the picture."""
-
-    t: Array
-    """[s]."""
-    behind: Array
-    """How far behind the robot plays [s]."""
-    sent: Array
-    """When packets were sent [s]."""
-    delay: Array
-    """How long they took [s]."""
-
-
-def run(profile: str, seed: int, length: float, D: float | None) -> tuple[JitterResult, Trace]:
-    """Both sites over datagrams with that delay each way.
+def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Results, Results]:
+    """Both sites over datagrams with that delay each way: figures, and what the picture shows.
 
     Args:
         profile: Of the delay.
@@ -115,7 +88,7 @@ def _done(lab: Laboratory, sent: int) -> bool:
     return report is not None and report.executed >= sent and report.play > max(t.end for t in timelines)
 
 
-def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> JitterResult:
+def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Results:
     limits = MODEL.limits
     play, reference = played(lab)
     leader, follower = tool(replay(acts).timeline.sample(lab.t)), tool(reference.q)
@@ -140,20 +113,20 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Ji
     assert path.path_error_mean is not None
     assert path.path_error_p95 is not None
     assert path.path_error_max is not None
-    return JitterResult(
-        path.path_error_mean,
-        path.path_error_p95,
-        path.path_error_max,
-        path.time_difference_mean,
-        path.time_difference_max,
-        path.progress,
-        float(aside),
-        bursts(given, there),
-        float(max(used)),
-        float(play.pace.max()),
-        sum(at > asked + OVER for asked, at, _ in both),
-        len(both),
-        len(lab.operator.corrections),
+    return Results(
+        mean=path.path_error_mean,  # path error of the tool over time [m], METRICS
+        p95=path.path_error_p95,
+        largest=path.path_error_max,
+        time_difference=path.time_difference_mean,  # over the path that both robots took [s]
+        time_difference_max=path.time_difference_max,
+        progress=path.progress,  # share of the path reached
+        aside=float(aside),  # real tool from the virtual one at the same time on the timeline, at most [m]
+        bursts=bursts(given, there),
+        limits=float(max(used)),  # largest speed or acceleration, as a share of its limit
+        pace=float(play.pace.max()),  # fastest that the timeline was played
+        postponed=sum(at > asked + OVER for asked, at, _ in both),  # moves that began later at the robot
+        moves=len(both),
+        corrections=len(lab.operator.corrections),  # of the virtual robot, by the real one
     )
 
 
@@ -169,34 +142,27 @@ def _first(p: Array, t: Array) -> tuple[Array, Array]:
     return p[new], t[new]
 
 
-def _trace(lab: Laboratory) -> Trace:
+def _trace(lab: Laboratory) -> Results:
     records = [r for r in lab.link.forward.log.take() if r.arrived is not None]
-    sent = np.array([r.sent for r in records])
-    delay = np.array([r.arrived - r.sent for r in records if r.arrived is not None])
     t, p = lab.t[::10], played(lab)[0].p[::10]
-    return Trace(t, t - p, sent, delay)
+    return Results(
+        t=t,  # [s]
+        behind=t - p,  # how far behind the robot plays [s]
+        sent=np.array([r.sent for r in records]),  # when packets were sent [s]
+        delay=np.array([r.arrived - r.sent for r in records if r.arrived is not None]),  # how long they took [s]
+    )
 
 
-class Result(NamedTuple):
-    """Of a profile."""
-
-    D: float
-    """The fixed offset [s]."""
-    adaptive: tuple[JitterResult, ...]
-    fixed: tuple[JitterResult, ...]
-    traces: tuple[Trace, Trace]
-    """Of the first run."""
-
-
-def work(study: Study, case: str) -> Result:
+def work(study: Study, case: str) -> Results:
     """Every seed with both offsets."""
     D = -delay_profile(case).quantile(SHARE)
     pairs = [[run(case, study.seed + k, study.length, d) for d in (None, D)] for k in range(study.runs)]
-    return Result(
-        D,
-        tuple(pair[0][0] for pair in pairs),
-        tuple(pair[1][0] for pair in pairs),
-        (pairs[0][0][1], pairs[0][1][1]),
+    adaptive, fixed = zip(*pairs, strict=True)
+    return Results(
+        D=D,  # the fixed offset [s]
+        adaptive=[seen for seen, _ in adaptive],
+        fixed=[seen for seen, _ in fixed],
+        traces=(adaptive[0][1], fixed[0][1]),
     )
 
 
@@ -206,93 +172,43 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     adaptive = [seen for result in results.values() for seen in result.adaptive]
     fixed = [seen for result in results.values() for seen in result.fixed]
     runs = f"{len(adaptive)} runs"
-    aside, limits = max(s.aside for s in adaptive), max(s.limits for s in adaptive)
-    pace, bursts = max(s.pace for s in adaptive), sum(s.bursts for s in adaptive)
     postponed, moves = sum(s.postponed for s in adaptive), sum(s.moves for s in adaptive)
-    progress = min(s.progress for s in adaptive)
     claims = [
-        Claim(
+        at_most(
             f"adaptive D, ideal servo: the real tool is off the virtual one's path by at most [m], {runs}",
-            SOURCE,
-            "≤ 0.001",
-            aside,
-            aside <= 1e-3,
+            SOURCE, 1e-3, max(s.aside for s in adaptive),
         ),
-        Claim(
+        none_of(
             f"adaptive D: bursts (moves that begin at the robot within half of the time between them), {runs}",
-            SOURCE,
-            0,
-            bursts,
-            bursts == 0,
+            SOURCE, sum(s.bursts for s in adaptive),
         ),
-        Claim("adaptive D: fastest pace of play", SOURCE, "≤ 1.05", pace, pace <= 1.05 + OVER),
-        Claim(
+        at_most("adaptive D: fastest pace of play", SOURCE, 1.05, max(s.pace for s in adaptive), slack=OVER),
+        at_most(
             "adaptive D: largest speed or acceleration at the real robot, as a share of its limit",
-            SOURCE,
-            "≤ 1",
-            limits,
-            limits <= 1 + OVER,
+            SOURCE, 1, max(s.limits for s in adaptive), slack=OVER,
         ),
-        Claim(f"adaptive D: moves postponed at the robot, of {moves}", SOURCE, 0, postponed, postponed == 0),
-        Claim(
+        none_of(f"adaptive D: moves postponed at the robot, of {moves}", SOURCE, postponed),
+        at_least(
             "adaptive D: the real robot takes the whole path, least share",
-            SOURCE,
-            "≥ 0.97",
-            progress,
-            progress >= 0.97,
+            SOURCE, 0.97, min(s.progress for s in adaptive),
         ),
-    ]
+    ]  # fmt: skip
     errors = [
         bootstrap([a.mean - f.mean for a, f in zip(r.adaptive, r.fixed, strict=True)], study.seed)
         for r in results.values()
     ]
     together, gain = (clustered(_differences(results, field), study.seed) for field in ("mean", "time_difference"))
     smaller = sum(e.is_below_zero for e in errors)
-    claims.append(
-        Claim(
-            "mean path error, adaptive less fixed D at the 95 % quantile [m], all profiles",
-            SOURCE,
-            "< 0",
-            together.value,
-            together.is_below_zero,
-            together.interval,
-        )
-    )
     late, all_moves = sum(s.postponed for s in fixed), sum(s.moves for s in fixed)
-    claims.append(
-        Claim(
-            f"a fixed D postpones moves, and the paths part: postponed, of {all_moves}",
-            SOURCE,
-            "> 0",
-            late,
-            late > 0,
-        )
-    )
-    claims.append(
-        Claim(
-            "mean time difference, adaptive less fixed D at the 95 % quantile [s], all profiles",
-            SOURCE,
-            "< 0",
-            gain.value,
-            gain.is_below_zero,
-            gain.interval,
-        )
-    )
-    columns = (
-        "delay",
-        "offset",
-        "D fixed s",
-        "path error mm, mean",
-        interval_name(study.runs),
-        "max",
-        "time difference s",
-        f"{interval_name(study.runs)} over seeds",
-        "max",
-        "bursts",
-        "limit used",
-        "postponed",
-        "corrections",
-    )
+    claims += [
+        below_zero(
+            "mean path error, adaptive less fixed D at the 95 % quantile [m], all profiles", SOURCE, together
+        ),
+        above(f"a fixed D postpones moves, and the paths part: postponed, of {all_moves}", SOURCE, 0, late),
+        below_zero(
+            "mean time difference, adaptive less fixed D at the 95 % quantile [s], all profiles", SOURCE, gain
+        ),
+    ]
     rows = [
         _row(study, case, how, result.D, seen)
         for case, result in results.items()
@@ -313,10 +229,10 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
             height=3.0,
         ),
     )
-    return Findings(tuple(claims), (Table("jitter", title, columns, tuple(rows)),), pictures)
+    return Findings(tuple(claims), (Table.of("jitter", title, rows),), pictures)
 
 
-def _differences(results: dict[str, Result], field: str) -> Array:
+def _differences(results: dict[str, Results], field: str) -> Array:
     """A figure of each run, adaptive less fixed D, (seeds, profiles); a seed gives the same commands everywhere."""
     return np.array([
         [getattr(a, field) - getattr(f, field) for a, f in zip(r.adaptive, r.fixed, strict=True)]
@@ -324,26 +240,27 @@ def _differences(results: dict[str, Result], field: str) -> Array:
     ]).T  # fmt: skip
 
 
-def _row(study: Study, case: str, how: str, D: float, seen: tuple[JitterResult, ...]) -> tuple[Any, ...]:
+def _row(study: Study, case: str, how: str, D: float, seen: list[Results]) -> tuple[tuple[str, Cell], ...]:
     late = bootstrap([s.time_difference for s in seen], study.seed)
+    level = interval_name(study.runs)
     return (
-        case,
-        how,
-        D if how == "fixed" else None,
-        1e3 * float(np.mean([s.mean for s in seen])),
-        1e3 * float(np.mean([s.p95 for s in seen])),
-        1e3 * max(s.largest for s in seen),
-        late.value,
-        f"{late.low:.2f} to {late.high:.2f}",
-        max(s.time_difference_max for s in seen),
-        sum(s.bursts for s in seen),
-        max(s.limits for s in seen),
-        sum(s.postponed for s in seen),
-        sum(s.corrections for s in seen),
+        ("delay", case),
+        ("offset", how),
+        ("D fixed s", D if how == "fixed" else None),
+        ("path error mm, mean", 1e3 * float(np.mean([s.mean for s in seen]))),
+        (level, 1e3 * float(np.mean([s.p95 for s in seen]))),
+        ("max", 1e3 * max(s.largest for s in seen)),
+        ("time difference s", late.value),
+        (f"{level} over seeds", f"{late.low:.2f} to {late.high:.2f}"),
+        ("max", max(s.time_difference_max for s in seen)),
+        ("bursts", sum(s.bursts for s in seen)),
+        ("limit used", max(s.limits for s in seen)),
+        ("postponed", sum(s.postponed for s in seen)),
+        ("corrections", sum(s.corrections for s in seen)),
     )
 
 
-def _paint(canvas: Canvas, study: Study, results: dict[str, Result]) -> None:
+def _paint(canvas: Canvas, study: Study, results: dict[str, Results]) -> None:
     above, below = canvas.subplots(2, 1, sharex=True)
     x = np.arange(len(results))
     for shift, name, colour in ((-0.18, "adaptive", VIRTUAL), (0.18, "fixed", REAL)):
@@ -366,7 +283,7 @@ def _paint(canvas: Canvas, study: Study, results: dict[str, Result]) -> None:
     legend(above, columns=2, place="upper right")
 
 
-def _paint_run(canvas: Canvas, traces: tuple[Trace, Trace]) -> None:
+def _paint_run(canvas: Canvas, traces: tuple[Results, Results]) -> None:
     ax = canvas.add_subplot()
     for trace, colour, name in zip(traces, (VIRTUAL, REAL), ("adaptive D", "fixed D"), strict=True):
         ax.plot(trace.t, trace.behind, color=colour, label=f"the robot is behind, {name}")

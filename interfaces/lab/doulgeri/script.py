@@ -9,6 +9,7 @@ import numpy as np
 from interfaces.clients.ports import MemoryTransport, RemotePort
 from interfaces.engine_server.site import Site
 from interfaces.link import Channel, ConstantDelay
+from interfaces.messages import Broadcast, Frame, Outcome, Reply
 from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
 from interfaces.teleop import JointReference
 from robots import puma560
@@ -111,6 +112,23 @@ class ScriptedSite:
     def run(self, until: float) -> None:
         """Let time pass until `until` [s]."""
         self.now = run_parts(self._parts, now=self.now, until=until)
+
+
+class PortLog:
+    """What comes by a port, with when it came."""
+
+    def __init__(self, port: RemotePort) -> None:
+        self.frames: list[tuple[Frame, float]] = []
+        self.outcomes: dict[int, Outcome] = {}
+        """The first of each command, by the command's number."""
+        port.join(self)
+
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Keep it, with the user's time [s]."""
+        if isinstance(message, Broadcast):
+            self.frames.append((message.frame, now))
+        elif isinstance(message, Outcome):
+            self.outcomes.setdefault(message.number, message)
 
 
 def played(lab: Laboratory) -> tuple[PlayState, JointReference]:

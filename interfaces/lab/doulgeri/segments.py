@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Findings, Study, Table
+from interfaces.lab.claims import Claim, Findings, Results, Study, Table, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, target
 from interfaces.lab.output import BAD, MUTED, VIRTUAL, draw, legend
 from vrs import Engine, JointTarget, MotionCommand, PolynomialSegment, Profile, Timeline
@@ -25,17 +25,10 @@ STEP: Final = frozen_array((0.8, -0.5, 0.4, 0.3, 0.4, -0.6))
 GOAL: Final = frozen_array(HOME - 0.5 * STEP)
 """The second command's [rad]."""
 FIG_1: Final = "Fig. 1, eq. (6)"
+II_B: Final = "Section II-B"
 
 
-class Example(NamedTuple):
-    """Fig. 1 itself."""
-
-    before: Timeline
-    after: Timeline
-    t_exec: float
-
-
-def example() -> Example:
+def example() -> Results:
     """A move, and a second command in its linear segment; nothing is scheduled after it."""
     engine = Engine(MODEL, q=HOME, clock=None)
     engine.execute(MotionCommand(JointTarget(HOME + STEP), execute_at=0.5, speed=0.6))
@@ -43,7 +36,7 @@ def example() -> Example:
     line = moving(before)[1]
     t_exec = line.start + 0.5 * line.duration
     engine.execute(MotionCommand(JointTarget(GOAL), execute_at=t_exec, speed=0.6))
-    return Example(before, engine.timeline, t_exec)
+    return Results(before=before, after=engine.timeline, t_exec=t_exec)
 
 
 def moving(timeline: Timeline) -> tuple[PolynomialSegment, ...]:
@@ -67,23 +60,8 @@ def jumps(timeline: Timeline) -> tuple[float, float]:
     return worst[0], worst[1]
 
 
-class Spliced(NamedTuple):
-    """What became of timelines with moves scheduled after the interrupted one."""
-
-    position_jump: float
-    velocity_jump: float
-    tails: int
-    """Tail segments that were compared."""
-    changed: int
-    """Those whose coefficients or durations aren't the same bits."""
-    uneven: float
-    """Largest difference of the shifts within a tail [s]."""
-    past: float
-    """Largest change before t_exec [rad]."""
-
-
-def splice(rng: np.random.Generator) -> Spliced:
-    """Four moves, and a command somewhere in the first three, many times."""
+def splice(rng: np.random.Generator) -> Results:
+    """Four moves, and a command somewhere in the first three, many times: what became of the moves after it."""
     worst, tails, changed, uneven, past = [0.0, 0.0], 0, 0, 0.0, 0.0
     for _ in range(MOVES):
         engine = Engine(MODEL, q=HOME, clock=None)
@@ -107,7 +85,14 @@ def splice(rng: np.random.Generator) -> Spliced:
         uneven = max(uneven, float(np.ptp(shifts)) if shifts else 0.0)
         early: Array = np.linspace(old.start, t_exec, 200)
         past = max(past, float(np.abs(old.sample(early) - new.sample(early)).max()))
-    return Spliced(worst[0], worst[1], tails, changed, uneven, past)
+    return Results(
+        position_jump=worst[0],
+        velocity_jump=worst[1],
+        tails=tails,  # tail segments that were compared
+        changed=changed,  # those whose coefficients or durations aren't the same bits
+        uneven=uneven,  # largest difference of the shifts within a tail [s]
+        past=past,  # largest change before t_exec [rad]
+    )
 
 
 def _of(timeline: Timeline, owner: int) -> list[PolynomialSegment]:
@@ -130,77 +115,39 @@ def work(study: Study, _case: str) -> Findings:
     later = _appended()
     many = f"{study.runs * MOVES} random splices"
     claims = (
-        Claim(
-            "a linear move with parabolic blends: segments, and their degrees",
-            FIG_1,
-            "3: 2, 1, 2",
-            f"{len(s)}: {', '.join(str(degree(x)) for x in s)}",
-            [degree(x) for x in s] == [2, 1, 2],
-        ),
-        Claim(
-            "a second command in the linear segment: segments, and their degrees",
-            FIG_1,
-            "5: 2, 1, 2, 1, 2",
-            f"{len(new)}: {', '.join(str(degree(x)) for x in new)}",
-            [degree(x) for x in new] == [2, 1, 2, 1, 2],
-        ),
+        _degrees("a linear move with parabolic blends", s, "3: 2, 1, 2"),
+        _degrees("a second command in the linear segment", new, "5: 2, 1, 2, 1, 2"),
         Claim(
             "s1 stays as it is, s2' is s2 cut short at t_exec, s3' begins there",
-            FIG_1,
-            "so",
+            FIG_1, "so",
             f"s1 {_kept(kept)}, s2' {_kept(head)}, s3' begins {new[2].start - fig.t_exec:.1e} s after t_exec",
             bool(kept and head and abs(new[1].end - fig.t_exec) <= SAME and abs(new[2].start - fig.t_exec) <= SAME),
         ),
         Claim(
             "with nothing scheduled after it the old target is replaced: distance of the end from the new [rad]",
-            FIG_1,
-            "≤ 1e-9",
-            max(goal, end),
-            bool(replaced and max(goal, end) <= SAME),
+            FIG_1, "≤ 1e-9", max(goal, end), bool(replaced and max(goal, end) <= SAME),
         ),
-        Claim(
+        at_most(
             f"continuity, a⁰ of s(i+1) = p of s(i) at its end: largest jump [rad], {many}",
-            "Section II, eq. (3)",
-            "≤ 1e-9",
-            position,
-            position <= SAME,
+            "Section II, eq. (3)", SAME, position,
         ),
-        Claim(
-            f"velocity is continuous too: largest jump [rad/s], {many}",
-            "Section II-B",
-            "≤ 1e-9",
-            velocity,
-            velocity <= SAME,
-        ),
-        Claim(
+        at_most(f"velocity is continuous too: largest jump [rad/s], {many}", II_B, SAME, velocity),
+        none_of(
             f"the tail's coefficients and durations stay the same bits: segments that changed, of {tails}",
-            "Section II-B",
-            0,
-            changed,
-            changed == 0 and tails > 0,
+            II_B, changed, of=tails,
         ),
         Claim(
             f"the tail is shifted as one: largest difference of shifts [s], {many}",
-            "Section II-B",
-            "≤ 1e-9",
-            uneven,
-            uneven <= SAME and tails > 0,
+            II_B, "≤ 1e-9", uneven, uneven <= SAME and tails > 0,
         ),
-        Claim(
+        at_most(
             f"a command modifies the trajectory only from t_exec on: largest change before it [rad], {many}",
-            "Section II-B, eq. (5)",
-            "≤ 1e-9",
-            past,
-            past <= SAME,
+            "Section II-B, eq. (5)", SAME, past,
         ),
-        Claim(
-            "t_exec at or after the end of the last segment: new segments begin then, off by [s]",
-            "Section II-B",
-            "≤ 1e-9",
-            later,
-            later <= SAME,
+        at_most(
+            "t_exec at or after the end of the last segment: new segments begin then, off by [s]", II_B, SAME, later
         ),
-    )
+    )  # fmt: skip
     columns = ("segment", "start s", "end s", "degree", "a0 deg", "a1 deg/s", "a2 deg/s²")
     rows = [_row(f"s{i + 1}", x) for i, x in enumerate(s)]
     rows += [_row(f"s{i + 1}'" if i else "s1", x) for i, x in enumerate(new)]
@@ -212,6 +159,11 @@ def work(study: Study, _case: str) -> Findings:
         height=3.6,
     )
     return Findings(claims, (table,), (picture,))
+
+
+def _degrees(what: str, segments: tuple[PolynomialSegment, ...], expected: str) -> Claim:
+    found = f"{len(segments)}: {', '.join(str(degree(segment)) for segment in segments)}"
+    return Claim(f"{what}: segments, and their degrees", FIG_1, expected, found, found == expected)
 
 
 def _appended() -> float:
@@ -233,7 +185,7 @@ def _row(name: str, segment: PolynomialSegment) -> tuple[str | float, ...]:
     return (name, segment.start, segment.end, degree(segment), *a.tolist())
 
 
-def _paint(canvas: Canvas, fig: Example) -> None:
+def _paint(canvas: Canvas, fig: Results) -> None:
     ax = canvas.add_subplot()
     old, new = moving(fig.before), moving(fig.after)
     for timeline, style, colour, name in (

@@ -8,14 +8,14 @@ ours, beside them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table
 from interfaces.lab.driving.output import of_drives
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
@@ -67,13 +67,8 @@ class ArchitectureResult(NamedTuple):
         return self.path.path_error_max or 0.0
 
 
-class ArchitectureSummary(NamedTuple):
-    """Of one robot under one network."""
-
-    runs: dict[str, tuple[ArchitectureResult, ...]]
-    """By composition, a run a seed."""
-    first: dict[str, DriveRun]
-    """The first seed's runs, for pictures; none but where one is drawn."""
+Runs: TypeAlias = dict[str, tuple[ArchitectureResult, ...]]
+"""By composition, a run a seed."""
 
 
 def name(architecture: str, transport: Transport) -> str:
@@ -117,10 +112,10 @@ DRAWN: Final = ("model thu", "micro thu")
 """Cases whose first runs are drawn: like Figures 11, 12 and 15, 16."""
 
 
-def work(study: Study, case: str) -> ArchitectureSummary:
-    """All compositions and seeds of a case."""
+def work(study: Study, case: str) -> Results:
+    """All compositions and seeds of a case; and of a case that is drawn the first seed's runs."""
     robot, profile = case.split()
-    runs: dict[str, tuple[ArchitectureResult, ...]] = {}
+    runs: Runs = {}
     first: dict[str, DriveRun] = {}
     for architecture, transport in COMPOSITIONS:
         found = []
@@ -130,12 +125,12 @@ def work(study: Study, case: str) -> ArchitectureSummary:
             if k == 0 and case in DRAWN:
                 first[name(architecture, transport)] = drive
         runs[name(architecture, transport)] = tuple(found)
-    return ArchitectureSummary(runs, first)
+    return Results(runs=runs, first=first)
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """The paper's claims, then ours."""
-    found: dict[str, ArchitectureSummary] = dict(zip(CASES, results, strict=True))
+    found: dict[str, Results] = dict(zip(CASES, results, strict=True))
     figures = []
     for case in DRAWN:
         robot, profile = case.split()
@@ -146,7 +141,7 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
 
 
 def _pooled(
-    found: dict[str, ArchitectureSummary],
+    found: dict[str, Results],
     cases: Sequence[str],
     who: str,
     value: Callable[[ArchitectureResult], float],
@@ -161,7 +156,7 @@ def _above_zero(text: str, source: str, values: Array, seed: int) -> Claim:
     return Claim(text, source, "over 0", estimate.value, estimate.low > 0, estimate.interval)
 
 
-def _papers(study: Study, found: dict[str, ArchitectureSummary]) -> tuple[Claim, ...]:
+def _papers(study: Study, found: dict[str, Results]) -> tuple[Claim, ...]:
     of = partial(_pooled, found)
     sim, micro, heavy = ([f"{robot} {profile}" for profile in PROFILES] for robot in ROBOTS)
     real, slow = (*micro, *heavy), [case for case in sim if not case.endswith("domain")]
@@ -170,9 +165,7 @@ def _papers(study: Study, found: dict[str, ArchitectureSummary]) -> tuple[Claim,
     return (
         _above_zero(
             "I: the path error accumulates, last third less first third [cm]",
-            f"{SECTION}.1, Fig. 12(a)",
-            of(sim, "I", lambda one: 100 * one.growth_error),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(a)", of(sim, "I", lambda one: 100 * one.growth_error), study.seed,
         ),
         Claim(
             "II keeps the path in simulation: median of the largest path error [cm]",
@@ -180,27 +173,19 @@ def _papers(study: Study, found: dict[str, ArchitectureSummary]) -> tuple[Claim,
         ),
         _above_zero(
             "II: the time difference grows (mon, wed, thu), last third less first third [s]",
-            f"{SECTION}.1, Fig. 12(d)",
-            of(slow, "II", lambda one: one.growth_late),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(d)", of(slow, "II", lambda one: one.growth_late), study.seed,
         ),
         _above_zero(
             "III has a smaller path error than I in simulation: I − III, largest [cm]",
-            f"{SECTION}.1, Fig. 12(e)",
-            of(sim, "I", _largest) - of(sim, "III", _largest),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(e)", of(sim, "I", _largest) - of(sim, "III", _largest), study.seed,
         ),
         _above_zero(
             "III has a smaller time difference than II (mon, wed, thu): II − III, mean [s]",
-            f"{SECTION}.1, Fig. 12(f)",
-            of(slow, "II", _late) - of(slow, "III", _late),
-            study.seed,
+            f"{SECTION}.1, Fig. 12(f)", of(slow, "II", _late) - of(slow, "III", _late), study.seed,
         ),
         _above_zero(
             "II's path error is large in the experiment: micro-robot − simulation, largest [cm]",
-            f"{SECTION}.2, Fig. 16(c)",
-            of(micro, "II", _largest) - of(sim, "II", _largest),
-            study.seed,
+            f"{SECTION}.2, Fig. 16(c)", of(micro, "II", _largest) - of(sim, "II", _largest), study.seed,
         ),
         Claim(
             "III's path error stays small in the experiment, both bodies: median of the largest [cm]",
@@ -208,9 +193,7 @@ def _papers(study: Study, found: dict[str, ArchitectureSummary]) -> tuple[Claim,
         ),
         _above_zero(
             "III has a smaller path error than II in the experiment, both bodies: II − III, largest [cm]",
-            f"{SECTION}.2, Fig. 16",
-            of(real, "II", _largest) - of(real, "III", _largest),
-            study.seed,
+            f"{SECTION}.2, Fig. 16", of(real, "II", _largest) - of(real, "III", _largest), study.seed,
         ),
     )  # fmt: skip
 
@@ -221,34 +204,11 @@ SHARES: Final = {"mon": 0.75, "wed": 0.6, "thu": 0.6}
 """Largest share of III's time difference that `timeline` on datagrams may have."""
 
 
-class _Asked:
-    """Claims about one robot under one network, as they are asked."""
-
-    def __init__(self, study: Study, profile: str, runs: dict[str, tuple[ArchitectureResult, ...]]) -> None:
-        self.claims: list[Claim] = []
-        self.runs, self._seed, self._profile = runs, study.seed, profile
-
-    def most(self, text: str, bar: float, measured: float | Estimate) -> None:
-        """It must be no more than the bar."""
-        value = measured.value if isinstance(measured, Estimate) else measured
-        interval = measured.interval if isinstance(measured, Estimate) else None
-        asked = f"{bar:.4g} at most"
-        self.claims.append(Claim(f"{self._profile}: {text}", OWN_BAR, asked, value, value <= bar, interval))
-
-    def more(self, text: str, first: str, second: str, value: Callable[[ArchitectureResult], float]) -> None:
-        """A figure of the first must be above that of the second, seed by seed."""
-        pairs = zip(self.runs[first], self.runs[second], strict=True)
-        found = bootstrap([value(a) - value(b) for a, b in pairs], self._seed)
-        text = f"{self._profile}: {text}: {first} − {second}"
-        self.claims.append(Claim(text, OWN_BAR, "over 0", found.value, found.low > 0, found.interval))
-
-    def mean(self, who: str, value: Callable[[ArchitectureResult], float]) -> float:
-        """A figure's mean over seeds."""
-        return float(np.mean([value(one) for one in self.runs[who]]))
-
-    def median(self, who: str, value: Callable[[ArchitectureResult], float]) -> Estimate:
-        """A figure's median over seeds."""
-        return bootstrap([value(one) for one in self.runs[who]], self._seed, median)
+def _most(text: str, bar: float, measured: float | Estimate) -> Claim:
+    """It must be no more than the bar."""
+    value = measured.value if isinstance(measured, Estimate) else measured
+    interval = measured.interval if isinstance(measured, Estimate) else None
+    return Claim(text, OWN_BAR, f"{bar:.4g} at most", value, value <= bar, interval)
 
 
 def _largest(one: ArchitectureResult) -> float:
@@ -263,69 +223,75 @@ def _speed(one: ArchitectureResult) -> float:
     return 100 * (one.path.speed_error or 0.0)
 
 
-def _ours(study: Study, found: dict[str, ArchitectureSummary]) -> list[Claim]:
+def _ours(study: Study, found: dict[str, Results]) -> list[Claim]:
     """What III and `timeline` must show on the 75 kg robot, network by network."""
-    claims: list[Claim] = []
-    for profile in PROFILES:
-        asked = _Asked(study, profile, found[f"ipr {profile}"].runs)
-        slow = profile != "domain"
-        asked.more("largest path error [cm]", "I", "III", _largest)
-        for other in ("I", "II") if slow else ():
-            asked.more("mean time difference [s]", other, "III", _late)
-        for who in (STREAMED, REPEATED):
-            _kept(asked, who, slow=slow, share=profile in ("wed", "thu"))
-        third = asked.mean("III", _late)
-        streamed, repeated = (asked.mean(who, _late) for who in (STREAMED, REPEATED))
-        asked.most(f"{STREAMED}: mean time difference as a share of III's", 1.1, streamed / third)
+    return [claim for profile in PROFILES for claim in _of_network(study, profile, found[f"ipr {profile}"].runs)]
+
+
+def _of_network(study: Study, profile: str, runs: Runs) -> Iterator[Claim]:
+    """Claims about the 75 kg robot under one network."""
+    slow = profile != "domain"
+
+    def mean(who: str, value: Callable[[ArchitectureResult], float]) -> float:
+        return float(np.mean([value(one) for one in runs[who]]))
+
+    def middle(who: str) -> Estimate:
+        return bootstrap([_largest(one) for one in runs[who]], study.seed, median)
+
+    def more(text: str, first: str, second: str, value: Callable[[ArchitectureResult], float]) -> Claim:
+        """A figure of the first must be above that of the second, seed by seed."""
+        difference = [[value(a) - value(b)] for a, b in zip(runs[first], runs[second], strict=True)]
+        text = f"{profile}: {text}: {first} − {second}"
+        return _above_zero(text, OWN_BAR, np.array(difference), study.seed)
+
+    yield more("largest path error [cm]", "I", "III", _largest)
+    for other in ("I", "II") if slow else ():
+        yield more("mean time difference [s]", other, "III", _late)
+    for who in (STREAMED, REPEATED):
+        # The path, the progress, the speeds and the limits that `timeline` keeps on a transport.
+        said, largest = f"{profile}: {who}", middle(who)
+        yield _most(f"{said}: largest path error, median [cm]", 2.0, largest)
+        yield _most(f"{said}: largest path error, worst seed [cm]", 5.0, max(map(_largest, runs[who])))
+        yield _most(f"{said}: its median less III-capped's [cm]", 0.2, largest.value - middle("III-capped").value)
+        if profile in ("wed", "thu"):
+            share = mean(who, _largest) / mean("III", _largest)
+            yield _most(f"{said}: largest path error, mean, as a share of III's", 0.2, share)
+        missed = max(1.0 - (one.path.progress or 0.0) for one in runs[who])
+        yield _most(f"{said}: largest share of the path not reached", 1.0 - LEAST_PROGRESS, missed)
         if slow:
-            asked.most(f"{REPEATED}: mean time difference as a share of III's", SHARES[profile], repeated / third)
-        else:
-            asked.most(f"{REPEATED}: mean time difference [s]", 0.5, repeated)
-        claims += asked.claims
-    return claims
-
-
-def _kept(asked: _Asked, who: str, *, slow: bool, share: bool) -> None:
-    """The path, the progress, the speeds and the limits that `timeline` keeps on a transport."""
-    middle, capped = (asked.median(name, _largest) for name in (who, "III-capped"))
-    asked.most(f"{who}: largest path error, median [cm]", 2.0, middle)
-    asked.most(f"{who}: largest path error, worst seed [cm]", 5.0, max(map(_largest, asked.runs[who])))
-    asked.most(f"{who}: its median less III-capped's [cm]", 0.2, middle.value - capped.value)
-    if share:
-        share_of = asked.mean(who, _largest) / asked.mean("III", _largest)
-        asked.most(f"{who}: largest path error, mean, as a share of III's", 0.2, share_of)
-    missed = max(1.0 - (one.path.progress or 0.0) for one in asked.runs[who])
-    asked.most(f"{who}: largest share of the path not reached", 1.0 - LEAST_PROGRESS, missed)
+            yield more("speed-profile error [cm/s]", "III", who, _speed)
+        broken = sum(one.collisions + one.limits_passed for one in runs[who])
+        yield _most(f"{said}: collisions and limits passed", 0, broken)
+    third, streamed, repeated = (mean(who, _late) for who in ("III", STREAMED, REPEATED))
+    share_of = "mean time difference as a share of III's"
+    yield _most(f"{profile}: {STREAMED}: {share_of}", 1.1, streamed / third)
     if slow:
-        asked.more("speed-profile error [cm/s]", "III", who, _speed)
-    broken = sum(one.collisions + one.limits_passed for one in asked.runs[who])
-    asked.most(f"{who}: collisions and limits passed", 0, broken)
+        yield _most(f"{profile}: {REPEATED}: {share_of}", SHARES[profile], repeated / third)
+    else:
+        yield _most(f"{profile}: {REPEATED}: mean time difference [s]", 0.5, repeated)
 
 
-def _table(found: dict[str, ArchitectureSummary]) -> Table:
+def _table(found: dict[str, Results]) -> Table:
     rows = []
     for case in CASES:
         robot, profile = case.split()
         for who, runs in found[case].runs.items():
-            largest = [100 * one.worst for one in runs]
-            rows.append((
-                robot, profile, who, float(np.median(largest)), max(largest),
-                float(np.mean([100 * (one.path.path_error_mean or 0.0) for one in runs])),
-                float(np.mean([one.late for one in runs])),
-                float(np.mean([100 * (one.path.speed_error or 0.0) for one in runs])),
-                float(min(one.path.progress or 0.0 for one in runs)),
-                sum(one.collisions for one in runs),
-            ))  # fmt: skip
-    columns = (
-        "robot",
-        "network",
-        "architecture",
-        "largest path error, median [cm]",
-        "worst [cm]",
-        "path error, mean [cm]",
-        "time difference [s]",
-        "speed error [cm/s]",
-        "least progress",
-        "collisions",
-    )
-    return Table("architectures", f"Architectures, correlation time {TAU} s", columns, tuple(rows))
+            largest = [_largest(one) for one in runs]
+            rows.append(
+                (
+                    ("robot", robot),
+                    ("network", profile),
+                    ("architecture", who),
+                    ("largest path error, median [cm]", float(np.median(largest))),
+                    ("worst [cm]", max(largest)),
+                    (
+                        "path error, mean [cm]",
+                        float(np.mean([100 * (one.path.path_error_mean or 0.0) for one in runs])),
+                    ),
+                    ("time difference [s]", float(np.mean([one.late for one in runs]))),
+                    ("speed error [cm/s]", float(np.mean([_speed(one) for one in runs]))),
+                    ("least progress", float(min(one.path.progress or 0.0 for one in runs))),
+                    ("collisions", sum(one.collisions for one in runs)),
+                )
+            )
+    return Table.of("architectures", f"Architectures, correlation time {TAU} s", rows)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.jobs import CarryOut, Done, EndJob, JobFailed, JobRunner, Show, SilentSpeaker
+from interfaces.jobs import CarryOut, EndJob, JobRunner, Show, SilentSpeaker
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
@@ -153,10 +153,10 @@ def _played(room: Room, body: MobileBody) -> ScenarioResult:
             attempt, moving = moving, 0
             stops.append(_stop(journey.goal, body.truth, pilot.posture))
             arrived = journey.state is JourneyState.ARRIVED
-            runner.receive(Done(attempt) if arrived else JobFailed(attempt, journey.reason), now=now)
+            runner.answer(attempt, None if arrived else journey.reason, now=now)
         if speaking and not speaker.is_speaking(now=now):
             attempt, speaking = speaking, 0
-            runner.receive(Done(attempt), now=now)
+            runner.answer(attempt, now=now)
         for request in runner.advance(now=now):
             match request:
                 case CarryOut(attempt, MoveJob(to=Goal() as goal)):
@@ -173,7 +173,7 @@ def _played(room: Room, body: MobileBody) -> ScenarioResult:
                     journey.end()
                     moving = speaking = 0
                 case CarryOut(attempt):
-                    runner.receive(JobFailed(attempt, "there's no arm"), now=now)
+                    runner.answer(attempt, "there's no arm", now=now)
         if begun and not runner.running:
             break
         pilot.step()

@@ -8,6 +8,7 @@ draw alike.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Final, NamedTuple
@@ -20,7 +21,7 @@ from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
 from interfaces.link.losses import loss_model
 from interfaces.rsp.model import RobotModel, read_model
-from interfaces.rsp.schemes import LocalEnd, ReportedPosition, Rims, RobotEnd, SchemeConfig, scheme
+from interfaces.rsp.schemes import ReportedPosition, Rims, SchemeConfig, scheme
 from robots.cubo import parameters as p
 from robots.ipr.chassis import MobileReality, Senses
 from robots.ipr.position import FusedPosition
@@ -124,37 +125,40 @@ def course(seed: int, length: float) -> Array:
     return np.vstack(([0.0, 0.0], np.cumsum(steps, axis=0)))
 
 
-class PathLeader:
+def path_leader(path: Array) -> Callable[[ReportedPosition], Rims]:
     """The local system's controller: the path's own curvature, and what brings the robot back.
 
     For l beside the path, along the way s: d²l/ds² + 2/λ dl/ds + l/λ² = 0. The robot is back after a few λ, without
     a swing, if the position is fresh. On a curve that has no error of its own, so what is measured is the link's.
+
+    Args:
+        path: At whose start the robot begins.
+
+    Returns:
+        What the wheels are to do [mm/s], from where the robot was seen.
     """
+    steps = np.diff(path, axis=0)
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    curvature = np.gradient(headings, SPEED * TICK)
+    at, reach = 0, round(3 * RECOVERY / (SPEED * TICK))
 
-    def __init__(self, path: Array) -> None:
-        """Take the path; the robot begins at its start."""
-        self._path = path
-        steps = np.diff(path, axis=0)
-        self._headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        self._curvature = np.gradient(self._headings, SPEED * TICK)
-        self._at = 0
-        self._reach = round(3 * RECOVERY / (SPEED * TICK))
-
-    def rims(self, seen: ReportedPosition) -> Rims:
-        """What the wheels are to do [mm/s], from where the robot was seen."""
-        near = self._path[self._at : self._at + self._reach] - (seen.x, seen.y)
-        self._at += int(np.einsum("ij,ij->i", near, near).argmin())
-        if self._at >= len(self._path) - 2:
+    def rims(seen: ReportedPosition) -> Rims:
+        nonlocal at
+        near = path[at : at + reach] - (seen.x, seen.y)
+        at += int(np.einsum("ij,ij->i", near, near).argmin())
+        if at >= len(path) - 2:
             return 0, 0
-        heading, (x, y) = float(self._headings[self._at]), self._path[self._at]
+        heading, (x, y) = float(headings[at]), path[at]
         beside = math.cos(heading) * (seen.y - y) - math.sin(heading) * (seen.x - x)
         angle = wrapped(seen.theta - heading)
-        left = SPEED * TICK * (len(self._path) - self._at)
+        left = SPEED * TICK * (len(path) - at)
         v = SPEED * max(math.cos(angle), 0.0) * min(1.0, left / BRAKING)
         back = clipped(beside / RECOVERY, 2.0) + 2.0 * angle
-        w = clipped(SPEED * (float(self._curvature[self._at]) - back / RECOVERY), 0.5 * p.LIMITS.w_max)
+        w = clipped(SPEED * (float(curvature[at]) - back / RECOVERY), 0.5 * p.LIMITS.w_max)
         half = 0.5 * w * p.WHEEL_BASE
         return round(1000 * (v - half)), round(1000 * (v + half))
+
+    return rims
 
 
 def make_body(case: FollowingCase) -> MobileRobot:
@@ -187,86 +191,56 @@ def run(case: FollowingCase) -> Followed:
         queue_packets=200,
     )
     link: Link[bytes, bytes] = Link(LinkConditions.symmetric(conditions), np.random.default_rng([case.seed, 2]))
+    path = course(case.seed, case.length)
+    lead = path_leader(path)
+    way: list[tuple[float, ...]] = []
+    given: list[float] = []  # when each command was [s]
+    fired: dict[int, float] = {}  # when each was carried out [s]
+    ages: list[float] = []
+    down = up = 0
     with make_body(case) as body:
-        return _FollowingRun(case, local, robot, link, body, chosen.header).whole()
-
-
-class _FollowingRun:
-    """A run while it goes on."""
-
-    def __init__(
-        self,
-        case: FollowingCase,
-        local: LocalEnd,
-        robot: RobotEnd,
-        link: Link[bytes, bytes],
-        body: MobileRobot,
-        header: int,
-    ) -> None:
-        self._case, self._local, self._robot, self._link, self._body = case, local, robot, link, body
-        self._header = header
-        self._path = course(case.seed, case.length)
-        self._leader = PathLeader(self._path)
-        self._position = FusedPosition(body)
-        self._steps = round(TICK / body.reality.dt)
-        self._given: list[float] = []
-        self._ages: list[float] = []
-        self._fired: dict[int, float] = {}
-        self._down = self._up = 0
-
-    def whole(self) -> Followed:
-        """From the start until some time after the path's end."""
-        ticks = round((self._case.length + AFTER) / TICK)
-        way = []
-        for k in range(ticks):
-            way.append(self._body.truth[:2])
-            self._tick(k)
-        return self._made(np.array(way))
-
-    def _tick(self, k: int) -> None:
-        now, local, robot, link = k * TICK, self._local, self._robot, self._link
-        for arrived in link.forward.receive(now):
-            robot.receive(arrived.payload, now=now)
-        for answer in link.backward.receive(now):
-            local.receive(answer.payload, now=now)
-        if local.seen is not None:
-            local.write(self._leader.rims(local.seen), now=now)
-        if k % round(FIRE / TICK) == 0 and now < self._case.length:
-            self._given.append(now)
-            local.fire(now=now)
-        for data in local.to_send(now=now):
-            self._down += len(data)
-            link.forward.send(data, now, len(data) + self._header)
-        left, right = robot.drive(now=now)
-        for number in robot.fired():
-            self._fired.setdefault(number, now)
-        if robot.stamp is not None:
-            self._ages.append(now - robot.stamp)
-        posture = self._position.posture()
-        robot.measure(ReportedPosition(*posture))
-        for data in robot.to_send(now=now):
-            self._up += len(data)
-            link.backward.send(data, now, len(data) + self._header)
-        v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / p.WHEEL_BASE
-        self._body.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), self._steps)
-
-    def _made(self, way: Array) -> Followed:
-        leader = np.vstack([self._path, np.repeat(self._path[-1:], len(way) - len(self._path), axis=0)])
-        match = match_paths(TICK * np.arange(len(way)), leader, way, v_max=SPEED)
-        ages = [at - self._given[number] for number, at in self._fired.items() if number < len(self._given)]
-        seconds = len(way) * TICK
-        reached = max(len(match.t_follower) - 1, 0) / max(len(match.s) - 1, 1)
-        return Followed(
-            path_error=float(match.distance.mean()),
-            path_error_max=float(match.distance.max()),
-            progress=float(reached),
-            age=float(np.mean(self._ages)) if self._ages else math.inf,
-            command_age=float(np.mean(ages)) if ages else math.inf,
-            commands_missing=len(self._given) - len(ages),
-            down=self._down / seconds,
-            up=self._up / seconds,
-            distance=match.distance,
-            arrivals=np.searchsorted(match.t, match.t_follower - 1e-9),
-            way=way,
-            path=self._path,
-        )
+        position, steps = FusedPosition(body), round(TICK / body.reality.dt)
+        for k in range(round((case.length + AFTER) / TICK)):
+            now = k * TICK
+            way.append(body.truth[:2])
+            for arrived in link.forward.receive(now):
+                robot.receive(arrived.payload, now=now)
+            for answer in link.backward.receive(now):
+                local.receive(answer.payload, now=now)
+            if local.seen is not None:
+                local.write(lead(local.seen), now=now)
+            if k % round(FIRE / TICK) == 0 and now < case.length:
+                given.append(now)
+                local.fire(now=now)
+            for data in local.to_send(now=now):
+                down += len(data)
+                link.forward.send(data, now, len(data) + chosen.header)
+            left, right = robot.drive(now=now)
+            for number in robot.fired():
+                fired.setdefault(number, now)
+            if robot.stamp is not None:
+                ages.append(now - robot.stamp)
+            robot.measure(ReportedPosition(*position.posture()))
+            for data in robot.to_send(now=now):
+                up += len(data)
+                link.backward.send(data, now, len(data) + chosen.header)
+            v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / p.WHEEL_BASE
+            body.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), steps)
+    leader = np.vstack([path, np.repeat(path[-1:], len(way) - len(path), axis=0)])
+    match = match_paths(TICK * np.arange(len(way)), leader, np.array(way), v_max=SPEED)
+    waits = [at - given[number] for number, at in fired.items() if number < len(given)]
+    seconds = len(way) * TICK
+    return Followed(
+        path_error=float(match.distance.mean()),
+        path_error_max=float(match.distance.max()),
+        progress=float(max(len(match.t_follower) - 1, 0) / max(len(match.s) - 1, 1)),
+        age=float(np.mean(ages)) if ages else math.inf,
+        command_age=float(np.mean(waits)) if waits else math.inf,
+        commands_missing=len(given) - len(waits),
+        down=down / seconds,
+        up=up / seconds,
+        distance=match.distance,
+        arrivals=np.searchsorted(match.t, match.t_follower - 1e-9),
+        way=np.array(way),
+        path=path,
+    )

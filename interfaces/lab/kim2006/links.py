@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Cell, Claim, Figure, Findings, Study, Table
+from interfaces.lab.claims import Cell, Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.kim2006.following import Followed, FollowingCase, run
 from interfaces.lab.output import BAD, GOOD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap
@@ -25,53 +25,35 @@ EQUAL: Final = 0.10
 """Figures nearer than this share are called equal."""
 
 
-class Pair(NamedTuple):
-    """RSP's path error beside another scheme's, seed by seed, over the way that both reached."""
-
-    rsp: tuple[float, ...]
-    other: tuple[float, ...]
-
-    @property
-    def difference(self) -> Estimate | None:
-        """RSP's less the other's [m]; None where no seed has both."""
-        return bootstrap(np.subtract(self.rsp, self.other), 0) if self.rsp else None
-
-    @property
-    def verdict(self) -> str:
-        """Who is nearer to the path: the interval of the difference says so, unless they're within 10 %."""
-        found = self.difference
-        if found is None:
-            return "the other never moved"
-        a, b = float(np.mean(self.rsp)), float(np.mean(self.other))
-        if abs(a - b) <= EQUAL * max(a, b):
-            return "equal"
-        if found.high < 0:
-            return "rsp"
-        return "other" if found.low > 0 else "unclear"
+def difference(rsp: tuple[float, ...], other: tuple[float, ...]) -> Estimate | None:
+    """RSP's path error less another scheme's, seed by seed [m]; None where no seed has both."""
+    return bootstrap(np.subtract(rsp, other), 0) if rsp else None
 
 
-class LinkResult(NamedTuple):
-    """One network with one loss."""
+def verdict(rsp: tuple[float, ...], other: tuple[float, ...]) -> str:
+    """Who is nearer to the path: the interval of the difference says so, unless they're within 10 %."""
+    found = difference(rsp, other)
+    if found is None:
+        return "the other never moved"
+    a, b = float(np.mean(rsp)), float(np.mean(other))
+    if abs(a - b) <= EQUAL * max(a, b):
+        return "equal"
+    if found.high < 0:
+        return "rsp"
+    return "other" if found.low > 0 else "unclear"
 
-    delay: str
-    loss: float
-    means: dict[str, tuple[float, ...]]
-    """By scheme: path error, largest, progress, age, command's age, commands missing, bytes down, bytes up."""
-    pairs: dict[str, Pair]
-    """RSP beside each other scheme."""
 
-
-def pair(rsp: list[Followed], other: list[Followed]) -> Pair:
-    """Compare seed by seed, up to the last centimetre of the path that both reached."""
+def pair(rsp: list[Followed], other: list[Followed]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Path errors of both, seed by seed, up to the last centimetre of the path that both reached."""
     both = [
         (a.error_until(cells), b.error_until(cells))
         for a, b in zip(rsp, other, strict=True)
         if (cells := min(len(a.arrivals), len(b.arrivals))) > 1
     ]
-    return Pair(tuple(a for a, _ in both), tuple(b for _, b in both))
+    return tuple(a for a, _ in both), tuple(b for _, b in both)
 
 
-def work(study: Study, case: str) -> list[LinkResult]:
+def work(study: Study, case: str) -> list[Results]:
     """All losses, schemes and seeds of a delay profile."""
     found = []
     for loss in LOSSES:
@@ -82,73 +64,90 @@ def work(study: Study, case: str) -> list[LinkResult]:
             ]
             for name in SCHEMES
         }
-        means = {name: tuple(np.mean([one[:8] for one in made], axis=0).tolist()) for name, made in runs.items()}
-        pairs = {name: pair(runs["rsp"], made) for name, made in runs.items() if name != "rsp"}
-        found.append(LinkResult(case, loss, means, pairs))
+        found.append(
+            Results(
+                delay=case,
+                loss=loss,
+                means={name: mean_of(made) for name, made in runs.items()},
+                pairs={name: pair(runs["rsp"], made) for name, made in runs.items() if name != "rsp"},
+            )
+        )
     return found
+
+
+def mean_of(runs: list[Followed]) -> Results:
+    """The means of the figures that are numbers."""
+    means = np.mean([one[:8] for one in runs], axis=0).tolist()
+    return Results(**dict(zip(Followed._fields, means, strict=False)))
 
 
 def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     """A claim a network and loss, and the table of all schemes."""
-    found: list[LinkResult] = [one for result in results for one in result]
+    found: list[Results] = [one for result in results for one in result]
     claims = tuple(wins_claim(one) for one in found)
-    columns = (
-        "delay", "loss", "scheme", "path error [cm]", "largest [cm]", "progress", "age of commands [s]",
-        "age of a single command [s]", "single commands missing", "to the robot [byte/s]", "from it [byte/s]",
-        "nearer to the path",
-    )  # fmt: skip
-    rows = tuple(_row(one, name) for one in found for name in SCHEMES)
-    table = Table(
-        "schemes", f"Four schemes on the same links, {study.runs} seeds of {study.length:g} s", columns, rows
-    )
+    rows = [_row(one, name) for one in found for name in SCHEMES]
+    title = f"Four schemes on the same links, {study.runs} seeds of {study.length:g} s"
+    table = Table.of("schemes", title, rows)
     return Findings(claims, (table, wins_table(found)), (_drawn(study), _errors(found)))
 
 
-def wins_claim(one: LinkResult) -> Claim:
+def wins_claim(one: Results) -> Claim:
     """RSP's path error beside that of TCP with fixed packets, over one link."""
-    beside = one.pairs["tcp"]
-    found = beside.difference
+    found = difference(*one.pairs["tcp"])
     text = f"{one.delay}, loss {one.loss:g}: path error of RSP − TCP with fixed packets, way that both reached [cm]"
     if found is None:
         return Claim(text, SOURCE, "not above 0", "TCP's robot never moved", True)
     ends = (100 * found.low, 100 * found.high)
-    return Claim(text, SOURCE, "not above 0", 100 * found.value, beside.verdict != "other", ends)
+    return Claim(text, SOURCE, "not above 0", 100 * found.value, verdict(*one.pairs["tcp"]) != "other", ends)
 
 
-def _row(one: LinkResult, name: str) -> tuple[Cell, ...]:
-    error, largest, progress, age, command, missing, down, up = one.means[name]
-    verdict = "" if name == "rsp" else one.pairs[name].verdict.replace("other", name)
+def _row(one: Results, name: str) -> tuple[tuple[str, Cell], ...]:
+    mean = one.means[name]
     return (
-        one.delay, one.loss, name, 100 * error, 100 * largest, progress, _finite(age), _finite(command), missing,
-        down, up, verdict,
-    )  # fmt: skip
+        ("delay", one.delay),
+        ("loss", one.loss),
+        ("scheme", name),
+        ("path error [cm]", 100 * mean.path_error),
+        ("largest [cm]", 100 * mean.path_error_max),
+        ("progress", mean.progress),
+        ("age of commands [s]", _finite(mean.age)),
+        ("age of a single command [s]", _finite(mean.command_age)),
+        ("single commands missing", mean.commands_missing),
+        ("to the robot [byte/s]", mean.down),
+        ("from it [byte/s]", mean.up),
+        ("nearer to the path", "" if name == "rsp" else verdict(*one.pairs[name]).replace("other", name)),
+    )
 
 
 def _finite(value: float) -> Cell:
     return value if math.isfinite(value) else "never"
 
 
-def wins_table(found: list[LinkResult]) -> Table:
+def wins_table(found: list[Results]) -> Table:
     """Where each scheme is better than RSP, in what."""
     rows: list[tuple[Cell, ...]] = []
-    measures: tuple[tuple[str, Callable[[tuple[float, ...]], float]], ...] = (
-        ("age of commands", lambda means: means[3]),
-        ("age of a single command", lambda means: means[4]),
-        ("bytes to the robot", lambda means: means[6]),
+    measures = (
+        ("age of commands", "age"),
+        ("age of a single command", "command_age"),
+        ("bytes to the robot", "down"),
     )
     for name in SCHEMES:
         if name == "rsp":
             continue
-        nearer = [one for one in found if one.pairs[name].verdict == "other"]
+        nearer = [one for one in found if verdict(*one.pairs[name]) == "other"]
         rows.append((name, "path error", len(nearer), len(found), _said(nearer)))
-        for what, of in measures:
-            better = [one for one in found if of(one.means[name]) < (1 - EQUAL) * of(one.means["rsp"])]
+        for what, field in measures:
+            better = [
+                one
+                for one in found
+                if getattr(one.means[name], field) < (1 - EQUAL) * getattr(one.means["rsp"], field)
+            ]
             rows.append((name, what, len(better), len(found), _said(better)))
     columns = ("scheme", "better than RSP in", "of the networks", "of", "which")
     return Table("wins", "Where another scheme is better than RSP, by more than 10 %", columns, tuple(rows))
 
 
-def _said(found: list[LinkResult]) -> str:
+def _said(found: list[Results]) -> str:
     return ", ".join(f"{one.delay}/{one.loss:g}" for one in found) or "nowhere"
 
 
@@ -172,13 +171,13 @@ def _drawn(study: Study) -> Figure:
     return draw("paths", "Path following, Fig. 11", paint, height=4.2)
 
 
-def _errors(found: list[LinkResult]) -> Figure:
+def _errors(found: list[Results]) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         names = [f"{one.delay}\n{one.loss:g}" for one in found]
         for name in SCHEMES:
             ax.plot(
-                range(len(found)), [100 * one.means[name][0] for one in found], "o-", color=COLOURS[name],
+                range(len(found)), [100 * one.means[name].path_error for one in found], "o-", color=COLOURS[name],
                 markersize=3, linewidth=0.8, label=name,
             )  # fmt: skip
         ax.set_xticks(range(len(found)), names, fontsize=5.0, rotation=60)
@@ -193,41 +192,24 @@ NARROW_CASES: Final = ("16", "64", "inf")
 """Bandwidth either way [kbit/s]."""
 
 
-class BandwidthResult(NamedTuple):
-    """Of one bandwidth: T fitted, and fixed at 20 ms."""
+def work_narrow(study: Study, case: str) -> tuple[list[Any], list[Any]]:
+    """All seeds of a bandwidth, a constant delay of 20 ms: T fitted, and fixed at 20 ms."""
+    following = FollowingCase(
+        "rsp", "constant:0.02", length=study.length, body="bare", bandwidth=1000.0 * float(case)
+    )
 
-    fitted: list[tuple[float, ...]]
-    fixed: list[tuple[float, ...]]
-
-
-def work_narrow(study: Study, case: str) -> BandwidthResult:
-    """All seeds of a bandwidth, a constant delay of 20 ms."""
-
-    def made(adaptive: bool) -> list[tuple[float, ...]]:
-        return [
-            run(
-                FollowingCase(
-                    "rsp",
-                    "constant:0.02",
-                    0.0,
-                    study.seed + k,
-                    study.length,
-                    "bare",
-                    1000.0 * float(case),
-                    adaptive,
-                )
-            )[:8]
-            for k in range(study.runs)
-        ]
-
-    return BandwidthResult(made(True), made(False))
+    fitted, fixed = (
+        [run(replace(following, seed=study.seed + k, adaptive=adaptive))[:8] for k in range(study.runs)]
+        for adaptive in (True, False)
+    )
+    return fitted, fixed
 
 
 def conclude_narrow(study: Study, results: tuple[Any, ...]) -> Findings:
     """Where the link is too narrow T fitted makes commands younger; elsewhere it changes nothing."""
     rows, claims = [], []
     for case, found in zip(NARROW_CASES, results, strict=True):
-        fitted, fixed = np.array(found.fitted), np.array(found.fixed)
+        fitted, fixed = map(np.array, found)
         for name, made in (("fitted", fitted), ("20 ms", fixed)):
             error, largest, progress, age, _, _, down, up = made.mean(axis=0).tolist()
             rows.append((f"{case} kbit/s", name, age, 100 * error, 100 * largest, progress, down, up))

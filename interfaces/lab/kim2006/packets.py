@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Figure, Findings, Study, Table
+from interfaces.lab.claims import Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.kim2006.following import cubo_model
 from interfaces.lab.output import GOOD, INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.rsp import header
@@ -34,19 +34,6 @@ CURVE: Final = 12.0
 SOURCE: Final = "Section IV-B, Fig. 10"
 
 
-class SentPackets(NamedTuple):
-    """Packets down in a run."""
-
-    t: tuple[float, ...]
-    """When [s]."""
-    sizes: tuple[int, ...]
-    """[byte]."""
-    missing: int
-    """Fragments that the robot never had."""
-    overflowed: int
-    """Fragments for which it had no buffer."""
-
-
 def scenario(t: float, length: float, duty: float) -> bool:
     """Whether music plays: three pieces, each in a third of the time, that end with it."""
     third = length / 3.0
@@ -54,7 +41,7 @@ def scenario(t: float, length: float, duty: float) -> bool:
     return math.floor(t % third / T + 0.5) * T >= third * (1.0 - duty) - 1e-9
 
 
-def perform(length: float, duty: float, *, sealed: bool = False) -> SentPackets:
+def perform(length: float, duty: float, *, sealed: bool = False) -> Results:
     """Let CUBO move lip and arms for a time [s], with music for a share of it; the link is perfect."""
     model, rng = cubo_model(), np.random.default_rng(5)
     keys = Keyring({Rank.OPERATOR: b"k" * 32}) if sealed else None
@@ -68,7 +55,8 @@ def perform(length: float, duty: float, *, sealed: bool = False) -> SentPackets:
     local.request(model.index("position"), True)
     for index in (lip, *arms):
         local.activate(index, True)
-    t, sizes = [], []
+    t: list[float] = []
+    sizes: list[int] = []
     for k in range(round(length / T)):
         now = k * T
         local.write(lip, bytes((k * 7 % 256, 128 + k % 64, 0)))
@@ -81,7 +69,12 @@ def perform(length: float, duty: float, *, sealed: bool = False) -> SentPackets:
             t.append(now)
             sizes.append(size)
         robot.streams.take(speaker)
-    return SentPackets(tuple(t), tuple(sizes), robot.streams.missing, robot.streams.overflowed)
+    return Results(
+        t=t,  # when packets went down [s]
+        sizes=sizes,  # theirs [byte]
+        missing=robot.streams.missing,  # fragments that the robot never had
+        overflowed=robot.streams.overflowed,  # fragments for which it had no buffer
+    )
 
 
 def _exchange(local: LocalCore, robot: RobotCore, now: float) -> list[int]:
@@ -96,7 +89,7 @@ def _exchange(local: LocalCore, robot: RobotCore, now: float) -> list[int]:
     return sizes
 
 
-def saving(sizes: tuple[int, ...], fixed: int = LARGE) -> float:
+def saving(sizes: list[int], fixed: int = LARGE) -> float:
     """What packets of these sizes save against packets of one size [%]."""
     return 100.0 * (1.0 - sum(sizes) / (fixed * len(sizes)))
 
@@ -131,7 +124,7 @@ def work(_study: Study, _case: str) -> Findings:
     return Findings(claims, (table,), (_sizes(found), _curve(curve, share, measured)))
 
 
-def _sizes(found: SentPackets) -> Figure:
+def _sizes(found: Results) -> Figure:
     def paint(canvas: Any) -> None:
         ax = canvas.add_subplot()
         ax.step(found.t, found.sizes, where="post", color=VIRTUAL, linewidth=1.0)

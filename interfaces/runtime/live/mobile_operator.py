@@ -17,15 +17,15 @@ from typing_extensions import override
 from interfaces.jobs import JobFile
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig, LiveMedia, MediaDoor
-from interfaces.messages.control import MOST_MESSAGES, Attached, Role
+from interfaces.messages.control import MOST_MESSAGES, Role
 from interfaces.messages.drive_sites import Doing, DriveReport, RobotTask
 from interfaces.messages.jobs import ArmJob, OperatorLoss
 from interfaces.messages.mobile import Postures, Tasks
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
 from interfaces.runtime.live.mobile_tasks import TaskDesk
-from interfaces.runtime.live.operator import GONE, SHOW, UNHEARD
-from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.runtime.live.operator import SHOW
+from interfaces.runtime.live.robot_client import GONE, RobotClient
 from interfaces.stream.access import Access
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers
@@ -94,8 +94,8 @@ class LiveMobileOperator(LeasedRobot, Workers):
         self.line = DriveLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
-            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, reports=DriveReport,
-            unfit=self._unfit, link_loss=config.link_loss,
+            self.line, config.robot, self.clock, self._turning.soon, name=config.base.name, room=config.room.name,
+            token=config.robot_token, reports=DriveReport, link_loss=config.link_loss,
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
@@ -154,15 +154,6 @@ class LiveMobileOperator(LeasedRobot, Workers):
         """What keeps the virtual robot out of the walls that are known."""
         room = self.config.room
         return None if room is EMPTY else operator_surroundings(room, start, self.config.base.base)
-
-    def _unfit(self, robot: Attached) -> str:
-        """Why a robot isn't the one that is driven here; empty if it is."""
-        model, room = self.config.base.name, self.config.room.name
-        if robot.robot != model:
-            return f"it's a {robot.robot}, and this site drives an {model}"
-        return (
-            "" if robot.room == room else f"its room is {robot.room!r}, and this site has {room!r}: give both one"
-        )
 
     async def _draw(self) -> None:
         """Draw both robots for those who look, once their bodies are made."""
@@ -248,12 +239,6 @@ class LiveMobileOperator(LeasedRobot, Workers):
         self._show(self.clock.now())
         self._turning.soon()
 
-    @property
-    def connected(self) -> bool:
-        """Whether the robot's site is heard of."""
-        heard = self.clock.now() - self.robot.heard < UNHEARD
-        return heard and self.line.connected and not self.robot.lost
-
     def _show(self, now: float) -> None:
         """Tell clients where both robots are."""
         operator, report, deviation = self.operator, self.operator.report, self.operator.deviation
@@ -271,7 +256,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
                 virtual=operator.virtual(now),
                 command=operator.site.before,
                 estimate=Posture(*operator.site.estimator.posture.tolist()),
-                connected=self.connected,
+                connected=self.robot.connected,
                 halted=operator.gone or ("" if operator.cause is HaltCause.BY_ITSELF else text_of(operator.halted)),
                 drives=operator.epochs,
                 round_trip=operator.round_trip,
@@ -282,17 +267,12 @@ class LiveMobileOperator(LeasedRobot, Workers):
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
-        attached, silence = self.robot.attached, self.clock.now() - self.robot.heard
-        report, deviation = self.operator.report, self.operator.deviation
+        attached, report, deviation = self.robot.attached, self.operator.report, self.operator.deviation
         return {
             "robot_at": self.robot.url,
             "room": self.config.room.name,
             "architecture": "" if attached is None else attached.architecture,
-            "delay": self.line.link.conditions.forward.delay.name,
-            "connected": self.connected,
-            "problem": self.robot.problem,
             **self.robot.health(),
-            "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
             "halted": text_of(self.operator.halted),
             "epoch": self.operator.epoch,
             "drives": self.operator.epochs,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import math
 import secrets
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
-from interfaces.messages.control import MOST_MESSAGES, Attached, Role, State
+from interfaces.messages.control import MOST_MESSAGES, Role, State
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import Report
 from interfaces.recording.errors import RecordingError
@@ -24,7 +23,7 @@ from interfaces.recording.live import TURN as RECORD
 from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.runtime.live.emulation import LiveEmulation
 from interfaces.runtime.live.process import warm
-from interfaces.runtime.live.robot_client import RobotClient
+from interfaces.runtime.live.robot_client import GONE, RobotClient
 from interfaces.stream.access import Access
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.leasing import LeasedRobot
@@ -47,10 +46,6 @@ SHOW = 1.0 / 60.0
 """Time between two frames of the view [s]."""
 TOLD_AGAIN = 0.2
 """Clients are told of a late measurement for so long [s]: not every state reaches everyone."""
-UNHEARD = 0.75
-"""A robot of which nothing has come for so long [s] isn't connected, as clients are told."""
-GONE = 2.0
-"""A robot of which nothing has come for so long [s] has stopped by itself, as far as a lease is concerned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,8 +105,8 @@ class LiveOperator(LeasedRobot):
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
-            self.line, config.robot, self.clock, self._turning.soon, token=config.robot_token, unfit=self._unfit,
-            link_loss=config.link_loss,
+            self.line, config.robot, self.clock, self._turning.soon, name=config.arm.name,
+            token=config.robot_token, link_loss=config.link_loss,
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
@@ -209,7 +204,7 @@ class LiveOperator(LeasedRobot):
         """Let what has happened be recorded."""
         while True:
             await asyncio.sleep(RECORD)
-            recorder.advance(now=self.clock.now(), connected=self.connected)
+            recorder.advance(now=self.clock.now(), connected=self.robot.connected)
 
     def _turn(self, now: float) -> float | None:
         version = self.operator.engine.timeline.version
@@ -248,11 +243,6 @@ class LiveOperator(LeasedRobot):
             self.recorder.tell(now, "rerouted", text)
         self._turning.soon()
 
-    def _unfit(self, robot: Attached) -> str:
-        """Why a robot isn't the one that is driven here; empty if it is."""
-        name = self.config.arm.name
-        return "" if robot.robot == name else f"it's a {robot.robot}, and this site drives a {name}"
-
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""
         report, end = self.operator.report, self.operator.engine.timeline.end
@@ -273,17 +263,11 @@ class LiveOperator(LeasedRobot):
         self.robot.lost = self.operator.gone = reason
         self._turning.soon()
 
-    @property
-    def connected(self) -> bool:
-        """Whether the robot's site is heard of."""
-        heard = self.clock.now() - self.robot.heard < UNHEARD
-        return heard and self.line.connected and not self.robot.lost
-
     def _show(self, now: float) -> None:
         """Tell clients where the real robot is, when that's news."""
         report = self.operator.report
         halted = self.operator.gone or text_of(self.operator.halted)
-        shown = report, self.connected, halted
+        shown = report, self.robot.connected, halted
         if report is None or shown == self._shown:
             return
         self._shown = shown
@@ -299,7 +283,7 @@ class LiveOperator(LeasedRobot):
                 D=report.q_at - report.measured_at,
                 following_error=float(np.abs(expected - report.q).max()),
                 epoch=Epoch(report.epoch) if report.epoch else None,
-                connected=self.connected,
+                connected=self.robot.connected,
                 halted=halted,
                 corrections=len(self.operator.corrections),
                 reference=report.reference,
@@ -313,14 +297,8 @@ class LiveOperator(LeasedRobot):
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
         report, attached, halted = self.operator.report, self.robot.attached, self.operator.halted
-        silence = self.clock.now() - self.robot.heard
         return {
-            "robot_at": self.robot.url,
-            "delay": self.line.link.conditions.forward.delay.name,
-            "connected": self.connected,
-            "problem": self.robot.problem,
             **self.robot.health(halted.text if halted is not None and halted.cause is HaltCause.STUCK else ""),
-            "silence": silence if math.isfinite(silence) and silence < 1e6 else None,
             "halted": text_of(halted),
             "epoch": self.operator.epoch,
             "corrections": len(self.operator.corrections),

@@ -24,8 +24,10 @@ from vrs.errors import VrsError
 
 AGAIN = 0.25
 """Time between two attempts to connect [s]."""
+UNHEARD = 0.75
+"""A robot of which nothing has come for so long [s] isn't connected, as clients are told."""
 GONE = 2.0
-"""A robot that was connected and of which nothing has come for so long [s] is gone."""
+"""A robot of which nothing has come for so long [s] is gone; as far as a lease is concerned, it has stopped."""
 OPENING = 3.0
 """Longest that a connection may take to be made, and answered [s]."""
 LARGEST = 4 << 20
@@ -63,9 +65,10 @@ class RobotClient:
         clock: Clock,
         changed: Callable[[], None],
         *,
+        name: str,
+        room: str = "",
         token: str | None = None,
         reports: type = Report,
-        unfit: Callable[[Attached], str] = lambda _: "",
         link_loss: LossPolicy | None = None,
     ) -> None:
         """Say where the robot is; `run` connects.
@@ -75,13 +78,14 @@ class RobotClient:
             url: `ws://HOST:PORT/site`; empty while that isn't known yet, see `url`.
             clock: Session time.
             changed: Called when something has come, or the connection has.
+            name: Of the robot's model; another isn't let in.
+            room: Of a mobile robot: name of the room that it's to drive in.
             token: Of the role `site`.
             reports: What its robots send.
-            unfit: Says why a robot isn't one for this operator; empty if it is.
             link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
         """
         self._coming: Any = reports | Ping | Problem
-        self._unfit, self._link_loss = unfit, link_loss
+        self._name, self._room, self._link_loss = name, room, link_loss
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
         self._session = secrets.token_urlsafe(12)
         self._waiting: deque[Value] = deque(maxlen=_WAITING)
@@ -96,16 +100,37 @@ class RobotClient:
         self.lost = ""
         """Why there's no robot to connect to any more; empty while there may be one."""
 
+    @property
+    def connected(self) -> bool:
+        """Whether the robot's site is heard of."""
+        return self._clock.now() - self.heard < UNHEARD and self._line.connected and not self.lost
+
     def health(self, also: str = "") -> dict[str, object]:
-        """Whether all is well with the robot, for `/health`, and why not.
+        """How the way to the robot is, for `/health`: whether all is well with it, and why not.
 
         Args:
             also: What else is wrong; empty if nothing is.
         """
-        reason = self.lost or also
-        if not reason and self.connections and self._clock.now() - self.heard > GONE:
+        reason, silence = self.lost or also, self._clock.now() - self.heard
+        if not reason and self.connections and silence > GONE:
             reason = f"nothing is heard of the robot at {self.url}: {self.problem or 'it is silent'}"
-        return {"ok": not reason, "reason": reason}
+        return {
+            "robot_at": self.url,
+            "delay": self._line.link.conditions.forward.delay.name,
+            "connected": self.connected,
+            "problem": self.problem,
+            "ok": not reason,
+            "reason": reason,
+            "silence": silence if silence < 1e6 else None,
+        }
+
+    def _unfit(self, robot: Attached) -> str:
+        """Why a robot isn't the one that is driven here; empty if it is."""
+        name, room = self._name, self._room
+        if robot.robot != name:
+            return f"it's a {robot.robot}, and this site drives {'an' if name[0] in 'aeiou' else 'a'} {name}"
+        same = robot.room == room
+        return "" if same else f"its room is {robot.room!r}, and this site has {room!r}: give both one"
 
     def send(self, message: Value) -> None:
         """Put a message on the connection."""

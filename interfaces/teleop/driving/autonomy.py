@@ -13,19 +13,17 @@ from typing import Protocol
 import numpy as np
 from typing_extensions import override
 
-from interfaces.jobs.devices import ArmControl, NoArm, Screen, SilentSpeaker, Speaker, TextScreen
 from interfaces.jobs.file import digest
 from interfaces.jobs.runner import (
+    ArmControl,
     CarryOut,
-    Done,
     EndJob,
-    Interrupted,
-    JobFailed,
     JobRunner,
-    OperatorLost,
     Request,
     RunnerConfig,
     Show,
+    SilentSpeaker,
+    Speaker,
 )
 from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
 from interfaces.messages.fields import MOST_POINTS
@@ -150,6 +148,8 @@ class NavigatorPilot(JourneyPilot):
 
 DIRECT = "it's to drive to a goal"
 """Why a list is paused when somebody gives another goal."""
+NO_ARM = "there's no arm here that could carry out a program"
+"""Why a program can't be begun."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +157,9 @@ class Hands:
     """Who carries out what isn't driving."""
 
     speaker: Speaker = field(default_factory=SilentSpeaker)
-    screen: Screen = field(default_factory=TextScreen)
-    arm: ArmControl = field(default_factory=NoArm)
+    screen: Callable[[str], object] = lambda _: None
+    """Shows a text in place of any other; an empty one clears it."""
+    arm: ArmControl | None = None
 
 
 class Autonomy:
@@ -204,7 +205,7 @@ class Autonomy:
     def receive(self, task: RobotTask, *, now: float) -> None:
         """Take a task; one that can't be done now changes nothing."""
         if task.go is not None:
-            self.runner.receive(Interrupted(DIRECT), now=now)
+            self.runner.interrupt(DIRECT, now=now)
             self._turn(now)
             self._set_out(task.go)
         elif task.halt is not None:
@@ -220,13 +221,13 @@ class Autonomy:
 
     def stop(self, reason: str, *, now: float) -> None:
         """Leave off; a list is paused."""
-        self.runner.receive(Interrupted(reason), now=now)
+        self.runner.interrupt(reason, now=now)
         self._turn(now)
         self._leave(reason)
 
     def lost(self, reason: str, *, now: float) -> None:
         """The operator is lost: stop or go on, as the policy says."""
-        self.runner.receive(OperatorLost(reason), now=now)
+        self.runner.lose_operator(reason, now=now)
         self._turn(now)
         if self.loss is OperatorLoss.STOP:
             self._leave(reason)
@@ -288,15 +289,15 @@ class Autonomy:
         pilot, hands, runner = self._pilot, self._hands, self.runner
         if self._move and self._next is None and pilot.state not in GOING:
             attempt, self._move = self._move, 0
-            well = pilot.state is JourneyState.ARRIVED
-            runner.receive(Done(attempt) if well else JobFailed(attempt, pilot.reason or "it was ended"), now=now)
+            arrived = pilot.state is JourneyState.ARRIVED
+            runner.answer(attempt, None if arrived else pilot.reason or "it was ended", now=now)
         if self._voice and not hands.speaker.is_speaking(now=now):
             attempt, self._voice, self._says = self._voice, 0, ""
-            runner.receive(Done(attempt), now=now)
-        outcome = hands.arm.outcome(now=now) if self._work else None
+            runner.answer(attempt, now=now)
+        outcome = hands.arm.outcome(now=now) if hands.arm is not None and self._work else None
         if outcome is not None:
             attempt, self._work = self._work, 0
-            runner.receive(JobFailed(attempt, outcome) if outcome else Done(attempt), now=now)
+            runner.answer(attempt, outcome or None, now=now)
         return runner.advance(now=now)
 
     def _begin(self, request: Request, now: float) -> None:
@@ -310,11 +311,11 @@ class Autonomy:
                 hands.speaker.speak(text, now=now)
             case Show(text):
                 self._shows = text
-                hands.screen.show(text)
+                hands.screen(text)
             case CarryOut(attempt, ArmJob(program=program, source=source)):
-                refusal = hands.arm.run(program, source, now=now)
+                refusal = NO_ARM if hands.arm is None else hands.arm.run(program, source, now=now)
                 if refusal:
-                    self.runner.receive(JobFailed(attempt, refusal), now=now)
+                    self.runner.answer(attempt, refusal, now=now)
                 else:
                     self._work = attempt
             case EndJob(attempt):
@@ -328,7 +329,7 @@ class Autonomy:
         elif attempt == self._voice:
             self._voice, self._says = 0, ""
             self._hands.speaker.hush()
-        elif attempt == self._work:
+        elif self._hands.arm is not None and attempt == self._work:
             self._work = 0
             self._hands.arm.end(now=now)
 

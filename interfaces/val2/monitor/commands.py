@@ -19,6 +19,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
 from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
+from interfaces.val2.rows import Form, Setting
 
 Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
 """Carries a command out, with what follows its name; what asks, or None."""
@@ -35,19 +36,25 @@ class Need(enum.Enum):
     """Control: it moves the arm, or changes what others see."""
 
 
-class Suggestion(NamedTuple):
-    """A word that may come."""
+class Word(NamedTuple):
+    """A word, as one of the things that it may be."""
 
     word: str
     help: str = ""
-    """One line; empty for none."""
+    """What it does, in one line; empty for none."""
+    kind: str = ""
+    """What it is; empty for a name."""
+    usage: str = ""
+    """How it's written."""
+    origin: str = ""
+    """Whose it is; empty where that isn't said."""
 
 
-Completer: TypeAlias = Callable[[TerminalState, str], Iterable[Suggestion]]
+Completer: TypeAlias = Callable[[TerminalState, str], Iterable[Word]]
 """Gives what may come behind a command's name, and what was typed between."""
 
 
-def _none(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+def _none(_state: TerminalState, _before: str) -> Iterable[Word]:
     return ()
 
 
@@ -70,6 +77,8 @@ class MonitorCommand:
     """Only while no program runs."""
     ours: bool = False
     """An extension, not VAL's."""
+    short: str = ""
+    """What stands for it though others begin with it too, between blanks."""
     more: bool = False
     """Something may follow its name though no form says what."""
 
@@ -92,7 +101,7 @@ class MonitorCommand:
         """Whether it changes nothing, with what follows its name."""
         if self.need is not Need.ARGUMENT:
             return self.need is Need.LOOK
-        return rest in {"", "?"} or (self.name == "PARAMETER" and "=" not in rest)
+        return rest in {"", "?"} or ("=" in self.forms and "=" not in rest)
 
 
 _ASSIGNMENT: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9._]*(\[[^\]]*\])?\s*=(?!=).*", re.DOTALL)
@@ -133,8 +142,8 @@ def command_named(word: str) -> MonitorCommand | None:
 
 def _candidates(word: str) -> list[str]:
     wanted = word.upper()
-    if wanted in COMMANDS or wanted in SHORT:
-        return [SHORT.get(wanted, wanted)]
+    if wanted in _EXACT:
+        return [_EXACT[wanted]]
     return begun(wanted, (name for name, one in COMMANDS.items() if one.act is not None))
 
 
@@ -147,56 +156,53 @@ def _near(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else ""
 
 
-def explained(word: str) -> Iterator[tuple[str, str, str]]:
-    """What a word is, how it's written, and what it does; a word may be several things."""
+def explained(word: str) -> Iterator[Word]:
+    """What a word is; it may be several things."""
     upper = word.upper()
     if upper in COMMANDS:
         one = COMMANDS[upper]
-        mark = ", ours" if one.ours else ""
-        yield f"command{mark}", " | ".join(one.usage), one.help
+        yield Word(upper, one.help, "command", " | ".join(one.usage), "ours" if one.ours else "")
     if upper in forms.INSTRUCTIONS:
         form = forms.INSTRUCTIONS[upper]
-        yield f"instruction, {form.origin}", form.usage, form.help
+        yield Word(upper, form.help, "instruction", form.usage, form.origin)
     for name in (upper, f"${upper}", f"#{upper}"):
         if name in forms.FUNCTIONS:
-            function = forms.FUNCTIONS[name]
-            yield f"function, {function.origin}", function.usage, function.help
+            form = forms.FUNCTIONS[name]
+            yield Word(name, form.help, "function", form.usage, form.origin)
     if upper in forms.SWITCHES:
-        one_switch = forms.SWITCHES[upper]
-        yield f"switch, {one_switch.origin}", f"ENABLE {upper} | DISABLE {upper}", one_switch.help
+        switch = forms.SWITCHES[upper]
+        yield Word(upper, switch.help, "switch", f"ENABLE {upper} | DISABLE {upper}", switch.origin)
     if upper in forms.PARAMETERS:
         row = forms.PARAMETERS[upper]
         said = f"{row.help} {layout.number(row.low)} to {layout.number(row.high)} {row.unit}."
-        yield f"parameter, {row.origin}", f"PARAMETER {upper} = value", said
-    for table, kind in ((forms.OPERATORS, "operator"), (forms.WORDS, "word")):
-        if upper in table:
-            yield kind, upper, table[upper]
+        yield Word(upper, said, "parameter", f"PARAMETER {upper} = value", row.origin)
+    for kind, words in (("operator", forms.OPERATORS), ("word", forms.WORDS)):
+        if upper in words:
+            yield Word(upper, words[upper], kind, upper)
     if upper in forms.IGNORED and upper not in COMMANDS:
         why = forms.UNAVAILABLE.get(upper)
         passed = "It's recognised in programs, and passed over: it has no meaning here."
-        yield "instruction, V+", upper, passed if why is None else f"It isn't available: {why}."
+        yield Word(upper, passed if why is None else f"It isn't available: {why}.", "instruction", upper, "V+")
 
 
 def help_(state: TerminalState, rest: str) -> None:
     """HELP; HELP word."""
     if not rest:
-        state.say("Commands; they may be abbreviated. HELP and a word says more of it.")
-        state.say(*layout.in_columns(COMMANDS))
-        state.say("Instructions, after DO or in programs:")
-        state.say(*layout.in_columns(forms.INSTRUCTIONS))
-        state.say("Functions:")
-        state.say(*layout.in_columns(forms.FUNCTIONS))
+        state.say(
+            "Commands; they may be abbreviated. HELP and a word says more of it.", *layout.in_columns(COMMANDS)
+        )
+        state.say("Instructions, after DO or in programs:", *layout.in_columns(forms.INSTRUCTIONS))
+        state.say("Functions:", *layout.in_columns(forms.FUNCTIONS))
         return
     tables = (COMMANDS, forms.INSTRUCTIONS, forms.FUNCTIONS, forms.SWITCHES, forms.PARAMETERS)
-    whole = next((found[0] for names in tables if len(found := begun(rest.upper(), names)) == 1), rest)
-    explanations = list(explained(rest)) or list(explained(whole))
-    if not explanations:
+    whole = next((some[0] for names in tables if len(some := begun(rest.upper(), names)) == 1), rest)
+    found = list(explained(rest)) or list(explained(whole))
+    if not found:
         raise ValError("Unknown word", f"{_short(rest)}{_near(rest, [word for names in tables for word in names])}")
-    for kind, usage, said in explanations:
-        state.say(
-            f"{usage}  ({kind})",
-            *textwrap.wrap(said, layout.WIDTH, initial_indent="    ", subsequent_indent="    "),
-        )
+    for one in found:
+        kind = f"{one.kind}, {one.origin}" if one.origin else one.kind
+        said = textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    ")
+        state.say(f"{one.usage}  ({kind})", *said)
 
 
 MOST: Final = 200
@@ -206,7 +212,7 @@ _DO: Final = re.compile(r"\sDO\s(.*)$", re.IGNORECASE | re.DOTALL)
 _LABEL: Final = re.compile(r"\s*\d+\s+")
 
 
-def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Suggestion]]:
+def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Word]]:
     """What may complete a line.
 
     Args:
@@ -226,7 +232,7 @@ def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tu
     if program:
         known = _instruction(state, before)
     elif not word:
-        known = (Suggestion(one.name, one.help) for one in COMMANDS.values())
+        known = iter(_rows(COMMANDS)(state, before))
     else:
         named = command_named(word)
         known = iter(named.completes(state, before.lstrip()[len(word) :]) if named else ())
@@ -234,10 +240,10 @@ def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tu
     fitting = {one.word: one for one in known if one.word.upper().startswith(wanted) and one.word.upper() != wanted}
     lower = bool(fragment) and not any(letter.isupper() for letter in fragment)
     some = sorted(fitting.values(), key=lambda one: one.word.upper())[:MOST]
-    return fragment, [Suggestion(one.word.lower() if lower else one.word, one.help) for one in some]
+    return fragment, [one._replace(word=one.word.lower()) if lower else one for one in some]
 
 
-def _instruction(state: TerminalState, before: str) -> Iterator[Suggestion]:
+def _instruction(state: TerminalState, before: str) -> Iterator[Word]:
     word, _ = split_word(_LABEL.sub("", before))
     keyword = word.upper()
     if not word:
@@ -250,40 +256,40 @@ def _instruction(state: TerminalState, before: str) -> Iterator[Suggestion]:
             yield from _programs(state, before)
         if keyword in forms.INSTRUCTIONS:
             allowed = forms.INSTRUCTIONS[keyword].allowed_words
-            yield from (Suggestion(one, forms.WORDS.get(one, "")) for one in allowed)
+            yield from (Word(one, forms.WORDS.get(one, "")) for one in allowed)
         yield from _operands(state, before)
 
 
-def _motion(state: TerminalState, before: str) -> Iterable[Suggestion]:
+def _motion(state: TerminalState, before: str) -> Iterable[Word]:
     found = _DO.search(before)
-    return _instruction(state, found[1]) if found else [Suggestion("DO")]
+    return _instruction(state, found[1]) if found else [Word("DO")]
 
 
-def _operands(state: TerminalState, before: str) -> Iterator[Suggestion]:
-    yield from (Suggestion(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
-    yield from (Suggestion(name, said) for name, said in forms.OPERATORS.items())
+def _operands(state: TerminalState, before: str) -> Iterator[Word]:
+    yield from (Word(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
+    yield from (Word(name, said) for name, said in forms.OPERATORS.items())
     yield from _names("location", "point", "real", "string")(state, before)
 
 
-def _programs(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-    return [Suggestion(one) for one in state.controller.memory.programs]
+def _programs(state: TerminalState, _before: str) -> Iterable[Word]:
+    return [Word(one) for one in state.controller.memory.programs]
 
 
-def _files(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-    return [Suggestion(one) for one in state.files.listed()]
+def _files(state: TerminalState, _before: str) -> Iterable[Word]:
+    return [Word(one) for one in state.files.listed()]
 
 
-def _rows(table: Mapping[str, forms.Form | forms.Switch | forms.Parameter]) -> Completer:
-    return lambda _state, _before: [Suggestion(one.name, one.help) for one in table.values()]
+def _rows(table: Mapping[str, Form | Setting | MonitorCommand]) -> Completer:
+    """The names of a table's rows, with their help."""
+    return lambda _state, _before: [Word(one.name, one.help) for one in table.values()]
 
 
 def _names(*kinds: str) -> Completer:
     """Names in memory, an array's once."""
 
-    def completes(state: TerminalState, _before: str) -> Iterable[Suggestion]:
-        listing = state.controller.memory.listing
-        found = {name.partition("[")[0]: None for kind in kinds for name, _ in listing(kind)}
-        return [Suggestion(name) for name in found]
+    def completes(state: TerminalState, _before: str) -> Iterable[Word]:
+        listed = [name for kind in kinds for name, _ in state.controller.memory.listing(kind)]
+        return map(Word, dict.fromkeys(name.partition("[")[0] for name in listed))
 
     return completes
 
@@ -293,9 +299,9 @@ def _until(letters: str, first: Completer, then: Completer = _none) -> Completer
     return lambda state, before: (then if set(letters) & set(before) else first)(state, before)
 
 
-def _all_words(_state: TerminalState, _before: str) -> Iterable[Suggestion]:
+def _all_words(_state: TerminalState, _before: str) -> Iterable[Word]:
     for name in {*COMMANDS, *forms.INSTRUCTIONS, *forms.FUNCTIONS, *forms.SWITCHES, *forms.PARAMETERS}:
-        yield Suggestion(name, next(said for _, _, said in explained(name)))
+        yield next(explained(name))
 
 
 def hint(text: str, *, program: bool = False) -> str:
@@ -315,17 +321,22 @@ def hint(text: str, *, program: bool = False) -> str:
         found = list(explained(parts[index]))
         wanted = "command" if index == 0 and not program else "instruction"
         if found:
-            _, usage, said = next((one for one in found if one[0].startswith(wanted)), found[0])
-            return f"{usage}: {said}"
+            one = next((one for one in found if one.kind == wanted), found[0])
+            return f"{one.usage}: {one.help}"
     return ""
 
 
 _LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
 _LOCATIONS, _REALS, _STRINGS = _names("location", "point"), _names("real"), _names("string")
 _SWITCHES, _STORED = _rows(forms.SWITCHES), _until("=", _files, _programs)
+_KINDS: Final = (
+    ("P", "programs", "program", _programs), ("L", "locations", "location", _until("=:", _LOCATIONS)),
+    ("R", "reals", "real", _REALS), ("S", "strings", "$string", _STRINGS),
+)  # fmt: skip
+"""Of which there are some commands each: last letter, what they are about, a form, and what completes it."""
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "",
-                   "Stop the program and the arm, within its limits; Ctrl-C does the same."),
+                   "Stop the program and the arm, within its limits; Ctrl-C does the same.", short="A"),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
                    ours=True),
@@ -335,25 +346,18 @@ _TABLE: Final = (
     MonitorCommand("COPY", partial(storage.put, keep=True), "new=old", "Copy a program.", completes=_programs),
     MonitorCommand("DELETE", partial(storage.delete, kind="programs"), "program,..",
                    "Delete programs; asks first.", completes=_programs, idle=True),
-    MonitorCommand("DELETEL", partial(storage.delete, kind="locations"), "location,..",
-                   "Delete locations; asks first.", completes=_until("=:", _LOCATIONS), idle=True),
-    MonitorCommand("DELETEP", partial(storage.delete, kind="programs"), "program,..",
-                   "Delete programs; asks first.", completes=_programs, idle=True),
-    MonitorCommand("DELETER", partial(storage.delete, kind="reals"), "real,..", "Delete reals; asks first.",
-                   completes=_REALS, idle=True),
-    MonitorCommand("DELETES", partial(storage.delete, kind="strings"), "$string,..", "Delete strings; asks first.",
-                   completes=_STRINGS, idle=True),
     MonitorCommand("DIRECTORY", storage.directory, "", "List the programs in memory.", _LOOK, _programs, more=True),
     MonitorCommand("DISABLE", partial(running.turn, on=False), "switch,..", "Turn switches off.",
                    completes=_SWITCHES),
     MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
-                   completes=_instruction, idle=True),
+                   completes=_instruction, idle=True, short="D"),
     MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.",
                    completes=_programs, idle=True),
     MonitorCommand("ENABLE", partial(running.turn, on=True), "switch,..",
                    "Turn switches on; ENABLE POWER after PANIC.", completes=_SWITCHES),
     MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
-                   "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True),
+                   "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True,
+                   short="E EX"),
     MonitorCommand("EXIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
     MonitorCommand("FLIST", storage.flist, "", "List the files.", _LOOK),
     MonitorCommand("FREE", storage.free, "", "Show what is in memory.", _LOOK),
@@ -382,7 +386,7 @@ _TABLE: Final = (
                    "Define or change a location; then CR, or changes: ,,10",
                    completes=_until("=:", _LOCATIONS, _operands)),
     MonitorCommand("PROCEED", lambda s, _: s.controller.proceed(now=s.now), "",
-                   "Go on with a program that stands, at its next step.", idle=True),
+                   "Go on with a program that stands, at its next step.", idle=True, short="P"),
     MonitorCommand("QUIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
     MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", completes=_programs,
                    idle=True),
@@ -395,17 +399,10 @@ _TABLE: Final = (
                    _ARGUMENT, _operands),
     MonitorCommand("SPEED", running.speed, "| percent", "Show or set the monitor speed; it counts at once.",
                    _ARGUMENT, _operands),
-    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK),
+    MonitorCommand("STATUS", running.status, "", "Show the program, its step and cycles, speeds, power.", _LOOK,
+                   short="S"),
     MonitorCommand("STORE", partial(storage.store, parts=""), "file[=program,..]",
                    "Write programs, with all that they use, to a file.", completes=_STORED),
-    MonitorCommand("STOREL", partial(storage.store, parts="locations"), "file[=location,..]",
-                   "Write locations to a file.", completes=_STORED),
-    MonitorCommand("STOREP", partial(storage.store, parts="programs"), "file[=program,..]",
-                   "Write programs to a file.", completes=_STORED),
-    MonitorCommand("STORER", partial(storage.store, parts="reals"), "file[=real,..]", "Write reals to a file.",
-                   completes=_STORED),
-    MonitorCommand("STORES", partial(storage.store, parts="strings"), "file[=$string,..]",
-                   "Write strings to a file.", completes=_STORED),
     MonitorCommand("SWITCH", running.switch, "| switch,..", "Show switches.", _LOOK, _SWITCHES),
     MonitorCommand("TEACH", locations.teach, "location", "Record one location after the other, each by CR; E ends.",
                    completes=_until("=:", _LOCATIONS), idle=True),
@@ -416,21 +413,18 @@ _TABLE: Final = (
                    "Take back the newest motion, as far as it's still to come.", ours=True),
     MonitorCommand("WHERE", locations.where, "| 1 | REAL",
                    "Show where the arm is; 1 repeats until CR, REAL: the other twin.", _LOOK,
-                   lambda _state, _before: [Suggestion("REAL", "The other twin.")]),
+                   lambda _state, _before: [Word("REAL", "The other twin.")], short="W"),
     MonitorCommand("XSTEP", running.xstep, "| program[,cycles[,step]]",
                    "Begin a program step by step, or do its next step.", completes=_programs, idle=True),
     MonitorCommand("ZERO", storage.zero, "", "Delete all programs and values; asks first.", idle=True),
+    *(MonitorCommand(f"DELETE{letter}", partial(storage.delete, kind=kind), f"{form},..",
+                     f"Delete {kind}; asks first.", completes=completes, idle=True)
+      for letter, kind, form, completes in _KINDS),
+    *(MonitorCommand(f"STORE{letter}", partial(storage.store, parts=kind), f"file[={form},..]",
+                     f"Write {kind} to a file.", completes=_STORED)
+      for letter, kind, form, _ in _KINDS),
 )  # fmt: skip
 
-COMMANDS: Final = {command.name: command for command in _TABLE}
+COMMANDS: Final = {row.name: row for row in sorted(_TABLE, key=lambda row: row.name)}
 """By name."""
-SHORT: Final = {
-    "A": "ABORT",
-    "D": "DO",
-    "E": "EXECUTE",
-    "EX": "EXECUTE",
-    "P": "PROCEED",
-    "S": "STATUS",
-    "W": "WHERE",
-}
-"""What stands for a command though others begin with it too."""
+_EXACT: Final = {word: row.name for row in _TABLE for word in (row.name, *row.short.split())}

@@ -117,7 +117,7 @@ class SharedController:
             now: Session time [s].
         """
         self._notice(now)
-        if self.holder is not None and self.holder != terminal:
+        if self.holder is not None and self.holder is not terminal:
             if self.control.held:
                 return "another terminal is in control"
             if self._runs:
@@ -145,15 +145,16 @@ class SharedController:
     def _withdraw(self, now: float) -> bool:
         """Take out of the plan what was asked for ahead; whether it's to be tried again."""
         person = self._person
-        shares = person is not None and person.holds
-        answer = self.control.request(person, now=now) if shares else ControlState.HELD
+        answer: ControlAnswer = ControlState.HELD
+        if person is not None and person.holds:
+            answer = self.control.request(person, now=now)
         if answer is ControlState.HELD and self.control.held:
             self.controller.arm.withdraw(now=now)
         return answer is ControlState.PENDING
 
     def leave(self, terminal: Listener, *, now: float) -> None:
         """A terminal is gone: what it ran is stopped."""
-        if self.holder == terminal:
+        if self.holder is terminal:
             self.holder = None
             if self._runs:
                 self.controller.abort(now=now)

@@ -80,7 +80,7 @@ class Editor:
             letter, rest = (found[1], found[2]) if found[1] else (found[3], found[4])
             return self._command(letter.upper(), rest or "")
         if text.strip():
-            self._put(parse_line(text))
+            self._put(parse_line(text), insert=self._inserting or self._at > len(self.program.steps))
             return [] if self._inserting else self._shown()
         if not self._inserting:
             self._at = min(self._at + 1, len(self.program.steps) + 1)
@@ -107,7 +107,7 @@ class Editor:
             case "L":
                 self._at = max(self._at - count, 1)
             case "T":
-                self._insert(Step(Instruction("MOVE", (self._record(rest),))))
+                self._put(Step(Instruction("MOVE", (self._record(rest),))), insert=True)
             case "F":
                 self._find(rest)
             case "U":
@@ -135,17 +135,11 @@ class Editor:
             raise ValError("Not found", text)
         self._at = found + 1
 
-    def _put(self, step: Step) -> None:
-        """An instruction: inserted, or in the place of this step."""
-        if self._inserting or self._at > len(self.program.steps):
-            self._insert(step)
-        else:
-            self._change(self._at - 1, 1, (step,))
-
-    def _insert(self, step: Step) -> None:
-        if len(self.program.steps) >= MOST_STEPS:
+    def _put(self, step: Step, *, insert: bool) -> None:
+        """Put an instruction before this step, or in its place."""
+        if insert and len(self.program.steps) >= MOST_STEPS:
             raise ValError("Program too long", f"{MOST_STEPS} steps at most")
-        self._change(self._at - 1, 0, (step,))
+        self._change(self._at - 1, 0 if insert else 1, (step,))
 
     def _change(self, first: int, count: int, new: tuple[Step, ...]) -> None:
         """Put steps in the place of some, and go behind them."""

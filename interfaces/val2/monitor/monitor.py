@@ -53,7 +53,8 @@ class TerminalMonitor:
         """
         self._person = person
         self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
-        self.state = TerminalState(shared.controller, files, version)
+        self._listener = self.take
+        self.state = TerminalState(shared.controller, shared.control, files, version)
         self._dialogue: Dialogue | None = None
         self._asked = Question()
         """What the dialogue asks."""
@@ -87,14 +88,14 @@ class TerminalMonitor:
             return Expects.ANSWER
         return Expects.COMMAND if self._dialogue is None else self._asked.expects
 
-    def suggestions(self, text: str) -> tuple[str, list[commands.Suggestion]]:
+    def suggestions(self, text: str) -> tuple[str, list[commands.Word]]:
         """What may complete the next line, as far as the cursor; see `commands.suggestions`."""
         fragment, found = commands.suggestions(text, self.state, program=self.expects is Expects.STEP)
         return fragment, [] if self.expects is Expects.ANSWER else found
 
     @property
     def _in_control(self) -> bool:
-        return self._shared.holder == self.take
+        return self._shared.holder is self._listener
 
     @property
     def _runs(self) -> bool:
@@ -142,7 +143,11 @@ class TerminalMonitor:
         word = text.strip().upper()
         at_prompt = not (self._busy or self._waiting) and self._prompted is None
         if not self._queues_commands and (word == "PANIC" or (word == "ABORT" and not at_prompt)):
-            self._urgent(word)
+            # It's done whatever is under way; what a program asks and what waits is dropped.
+            if word == "PANIC" or self._in_control:
+                self._waiting.clear()
+                self._prompted = None
+                self._command(word)
         elif self.takes(text):
             self._take(text)
         elif len(self._waiting) >= WAITING and not self._queues_commands:
@@ -150,13 +155,6 @@ class TerminalMonitor:
         else:
             self._waiting.append(text)
         self.advance(now=now)
-
-    def _urgent(self, word: str) -> None:
-        """What is done whatever is under way; what a program asks and what waits is dropped."""
-        if word == "PANIC" or self._in_control:
-            self._waiting.clear()
-            self._prompted = None
-            self._command(word)
 
     def takes(self, text: str) -> bool:
         """Whether a line can be taken now; else it waits."""
@@ -174,13 +172,11 @@ class TerminalMonitor:
 
     def _take(self, text: str) -> None:
         """Do what a line says."""
-        if self._dialogue is not None and not self._busy:
-            if self._asked.expects is Expects.COMMAND and text.strip().upper() not in self._asked.answers:
-                self._command(text)
-            else:
-                self.state.line = text
-                self._ask(self._dialogue, text)
-        elif self._prompted is not None:
+        self.state.line = text
+        dialogue = None if self._busy else self._dialogue
+        if dialogue is not None and not self._asked.passes(text):
+            self._ask(dialogue, text)
+        elif dialogue is None and self._prompted is not None:
             self._prompted = None
             with self.state.guarded():
                 self.state.controller.answer(text, now=self.state.now)
@@ -213,7 +209,7 @@ class TerminalMonitor:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
             if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
                 self._control_due, self._pending = self.state.now + CONTROL_POLL, (command.name, text)
@@ -222,11 +218,8 @@ class TerminalMonitor:
                 raise ValError("No control", f"{command.name}: {answer}")
         if command.idle and self.state.controller.running and command.name != "DO":
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
-        dialogue = command.carry_out(self.state, rest)
-        if dialogue is not None:
+        if (dialogue := command.carry_out(self.state, rest)) is not None:
             self._ask(dialogue, None)
-        if command.name == "ENABLE":
-            self._shared.control.resume(now=self.state.now)
 
     def interrupt(self, *, now: float) -> None:
         """Ctrl-C: what is asked is dropped, else what this terminal runs is aborted."""
@@ -265,7 +258,7 @@ class TerminalMonitor:
         self.state.drop_work()
         self.done = True
         self._waiting.clear()
-        self._shared.leave(self.take, now=self.state.now)
+        self._shared.leave(self._listener, now=self.state.now)
 
     def take(self, event: context.Event) -> None:
         """Take an event of the controller, when in control."""
@@ -314,7 +307,7 @@ class TerminalMonitor:
 
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.read_only or self._shared.request(self.take, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
         if answer is ControlState.PENDING:
             self._control_due = self.state.now + CONTROL_POLL
             return

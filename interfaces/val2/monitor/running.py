@@ -162,6 +162,8 @@ def turn(state: TerminalState, rest: str, *, on: bool) -> None:
         raise ValError("Missing argument", f"one of {', '.join(sorted(state.controller.switches))}")
     for name in _matched(rest, state.controller.switches, "switch"):
         _turn(state, name, on)
+    if on:
+        state.control.resume(now=state.now)
 
 
 def _matched(rest: str, known: Iterable[str], kind: str) -> list[str]:

@@ -12,6 +12,7 @@ from typing import Final, TypeAlias
 
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
+from interfaces.val2.monitor.control import Control
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.syntax import Expression, Number, Step, Variable
@@ -161,6 +162,10 @@ class Question:
     due: float = math.inf
     """When it's over without a line [s]."""
 
+    def passes(self, text: str) -> bool:
+        """Whether a line is a command, not an answer."""
+        return self.expects is Expects.COMMAND and text.strip().upper() not in self.answers
+
 
 Dialogue: TypeAlias = Generator[Question, str | None, None]
 """A command that asks. It's sent the lines that answer, None when a question is due; at the end of the input it's
@@ -172,6 +177,7 @@ class TerminalState:
     """What one terminal has and shows."""
 
     controller: Controller
+    control: Control
     files: Files
     version: str
     """Name and version of the program, and what it's connected to."""

@@ -246,12 +246,10 @@ class Terminal:
         @keys.add("c-c")
         def _interrupt(event: KeyPressEvent) -> None:
             buffer = event.app.current_buffer
-            if buffer.text and not self._monitor.busy:
-                buffer.reset()
-            else:
+            if self._monitor.busy or not buffer.text:
                 self._monitor.interrupt(now=self._clock.now())
-                buffer.reset()
                 self._turning.soon()
+            buffer.reset()
 
         @keys.add("c-d")
         def _end(event: KeyPressEvent) -> None:

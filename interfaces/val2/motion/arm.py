@@ -32,7 +32,7 @@ from interfaces.val2.motion.places import (
     with_word,
 )
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort
-from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded
+from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
@@ -309,8 +309,7 @@ class Arm(SettingsInForce):
         """DRIVE: turn a joint, 1 to 6, by a change [deg] at a speed [%]."""
         if joint not in range(1, 7):
             raise ValError("Illegal joint number", f"{joint}: 1 to 6")
-        if not 0 < speed < math.inf:
-            raise ValError("Illegal value", f"{speed:g}: a speed is above 0 %")
+        require(0 < speed < math.inf, speed, "a speed is above 0 %")
         joints = list(self.destination(now=now).joints.joints)
         joints[joint - 1] += change
         self._move(PrecisionPoint(tuple(joints)), False, now, speed=Speed(speed))
@@ -333,8 +332,7 @@ class Arm(SettingsInForce):
 
     def delay(self, seconds: float, *, now: float) -> None:
         """DELAY: stand still for a time [s], as a motion."""
-        if not 0 <= seconds < math.inf:
-            raise ValError("Illegal value", f"{seconds:g}: a delay is 0 or above")
+        require(0 <= seconds < math.inf, seconds, "a delay is 0 or above")
         self._update(now)
         if self._dry is None:
             self._delay = max(now, self._delay_span()[1]), seconds
@@ -551,8 +549,7 @@ class Arm(SettingsInForce):
 
     def set_monitor_speed(self, percent: float, *, now: float) -> None:
         """Monitor speed, at most 100: time alone is stretched."""
-        if not 0 < percent < math.inf:
-            raise ValError("Illegal value", f"{percent:g}: a speed is above 0 %")
+        require(0 < percent < math.inf, percent, "a speed is above 0 %")
         self._update(now)
         self._pace.set(percent, now=now)
 

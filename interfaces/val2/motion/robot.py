@@ -112,15 +112,11 @@ class EngineRobot(RobotPort):
         self._number += 1
         try:
             answer = self._do(command, now)
+            refusal = "" if answer is not None else "there's nothing to take back"
         except VrsError as error:
-            outcome = CommandOutcome(refusal=str(error))
-        else:
-            outcome = (
-                CommandOutcome(answer, code=self._code(answer))
-                if answer is not None
-                else CommandOutcome(refusal="there's nothing to take back")
-            )
-        self._outcomes[self._number] = outcome
+            answer, refusal = None, str(error)
+        code = RefusalCode.OTHER if answer is None else self._code(answer)
+        self._outcomes[self._number] = CommandOutcome(answer, refusal, code)
         if len(self._outcomes) > _REMEMBERED:
             self._outcomes.popitem(last=False)
         return self._number

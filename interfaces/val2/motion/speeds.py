@@ -19,6 +19,16 @@ INCH: Final = 25.4
 """[mm]."""
 
 
+def require(holds: bool, value: float | None, allowed: str) -> None:
+    """See that a value is one that may be.
+
+    Raises:
+        ValError: If it isn't.
+    """
+    if not holds:
+        raise ValError("Illegal value", f"{value:g}: {allowed}")
+
+
 @dataclass(frozen=True, slots=True)
 class Speed:
     """A program speed."""
@@ -96,8 +106,7 @@ class SettingsInForce:
     def set_speed(self, speed: float, turn: float | None, unit: str, always: bool) -> None:
         """SPEED; in percent it's the speed of turning, too, unless that's given."""
         for value in (speed, turn):
-            if value is not None and not 0 < value < math.inf:
-                raise ValError("Illegal value", f"{value:g}: a speed is above 0")
+            require(value is None or 0 < value < math.inf, value, "a speed is above 0")
         if turn is None:
             turn = speed if unit == "%" else 100.0
         self._change(always, speed=Speed(speed, unit, turn))
@@ -105,21 +114,18 @@ class SettingsInForce:
     def set_acceleration(self, up: float, down: float) -> None:
         """ACCEL; the smaller counts for both."""
         for value in (up, down):
-            if not 0 < value < math.inf:
-                raise ValError("Illegal value", f"{value:g}: an acceleration is above 0")
+            require(0 < value < math.inf, value, "an acceleration is above 0")
         self._change(True, acceleration=min(max(min(up, down) / 100.0, 0.01), 1.0))
 
     def set_duration(self, seconds: float, always: bool) -> None:
         """DURATION."""
-        if not 0 <= seconds < math.inf:
-            raise ValError("Illegal value", f"{seconds:g}: a duration is 0 or above")
+        require(0 <= seconds < math.inf, seconds, "a duration is 0 or above")
         self._change(always, duration=seconds)
 
     def set_tolerance(self, percent: float | None, fine: bool, always: bool) -> None:
         """COARSE, FINE."""
         percent = 100.0 if percent is None else percent
-        if not 0 < percent < math.inf:
-            raise ValError("Illegal value", f"{percent:g}: a tolerance is above 0 %")
+        require(0 < percent < math.inf, percent, "a tolerance is above 0 %")
         self._change(always, fine=fine, tolerance=percent)
 
     def set_nulling(self, on: bool, always: bool) -> None:

@@ -13,12 +13,8 @@ from msgspec.structs import replace
 
 from interfaces.jobs import (
     CarryOut,
-    Done,
     EndJob,
-    Interrupted,
-    JobFailed,
     JobRunner,
-    OperatorLost,
     RunnerConfig,
     Show,
 )
@@ -51,6 +47,9 @@ SCENARIO = JobList(
 )
 
 
+TROUBLES = (JobRunner.interrupt, JobRunner.lose_operator)
+
+
 def stages(runner: JobRunner) -> list[str]:
     return [job.stage.value for job in runner.progress.jobs]
 
@@ -68,10 +67,10 @@ def test_the_papers_scenario() -> None:
     assert runner.receive(ListCommand.RUN, now=0.0) == ""
     there = asked(runner, MoveJob, 0.0)
     assert there.job.to == B
-    runner.receive(Done(there.attempt), now=9.0)
+    runner.answer(there.attempt, now=9.0)
     said = asked(runner, VoiceJob, 9.0)
     assert said.job.text == "Hello!"
-    runner.receive(Done(said.attempt), now=10.0)
+    runner.answer(said.attempt, now=10.0)
     assert runner.advance(now=10.0) == (Show("Please put the book on my top side!"),)
     assert stages(runner) == ["done", "done", "done", "running", "planned"]
     assert runner.waits_for_key
@@ -80,7 +79,7 @@ def test_the_papers_scenario() -> None:
     assert runner.receive(ListCommand.KEY, now=5000.0) == ""
     back = asked(runner, MoveJob, 5000.0)
     assert back.job.to == A
-    runner.receive(Done(back.attempt), now=5010.0)
+    runner.answer(back.attempt, now=5010.0)
     assert runner.progress.stage is JobStage.DONE
     assert set(stages(runner)) == {"done"}
     assert "done: run it" in runner.receive(ListCommand.RESUME, now=5011.0)
@@ -89,15 +88,13 @@ def test_the_papers_scenario() -> None:
 @pytest.mark.parametrize(
     "job", [MoveJob(2, A), VoiceJob(2, "Hello!"), WaitJob(2, 5.0), WaitJob(2), ArmJob(2, "pick")]
 )
-@pytest.mark.parametrize(
-    "how", [ListCommand.ABORT, ListCommand.PAUSE, Interrupted("it touches a chair"), OperatorLost("link loss")]
-)
+@pytest.mark.parametrize("how", [ListCommand.ABORT, ListCommand.PAUSE, *TROUBLES])
 def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how: Any) -> None:
     jobs = JobList((MessageJob(1, "Hm"), job, MoveJob(3, B)))
     runner = JobRunner(jobs)
     runner.receive(ListCommand.RUN, now=0.0)
     begun = [request for request in runner.advance(now=0.0) if not isinstance(request, Show)]
-    assert runner.receive(how, now=1.0) == ""
+    assert not (how(runner, "trouble", now=1.0) if how in TROUBLES else runner.receive(how, now=1.0))
     ended = [request for request in runner.advance(now=1.0) if not isinstance(request, Show)]
     assert ended == [EndJob(request.attempt) for request in begun]
     stage = "aborted" if how is ListCommand.ABORT else "paused"
@@ -106,7 +103,7 @@ def test_ending_any_job_in_its_middle_stops_it_and_keeps_the_list(job: Job, how:
     assert runner.jobs == jobs
     # Late answers count for nothing.
     for request in begun:
-        runner.receive(Done(request.attempt), now=2.0)
+        runner.answer(request.attempt, now=2.0)
     assert runner.advance(now=100.0) == ()
     assert stages(runner) == ["done", stage, "planned"]
     # And it can go on.
@@ -149,7 +146,7 @@ def test_a_job_that_fails_says_why_and_can_be_tried_again() -> None:
     runner = JobRunner(SCENARIO)
     runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveJob, 0.0)
-    runner.receive(JobFailed(first.attempt, "there's no way"), now=3.0)
+    runner.answer(first.attempt, "there's no way", now=3.0)
     assert runner.progress.stage is JobStage.FAILED
     assert runner.progress.reason == "there's no way"
     assert runner.advance(now=4.0) == ()
@@ -162,13 +159,13 @@ def test_losing_the_operator_follows_the_policy(loss: OperatorLoss) -> None:
     runner = JobRunner(SCENARIO, RunnerConfig(loss=loss))
     runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveJob, 0.0)
-    runner.receive(OperatorLost("the link is lost"), now=1.0)
+    runner.lose_operator("the link is lost", now=1.0)
     if loss is OperatorLoss.STOP:
         assert runner.advance(now=1.0) == (EndJob(first.attempt),)
         assert (runner.progress.stage, runner.progress.reason) == (JobStage.PAUSED, "the link is lost")
     else:
         assert runner.advance(now=1.0) == ()
-        runner.receive(Done(first.attempt), now=2.0)
+        runner.answer(first.attempt, now=2.0)
         assert asked(runner, VoiceJob, 2.0)
 
 
@@ -177,7 +174,7 @@ def test_a_list_is_edited_where_it_stands_still() -> None:
     runner.receive(ListCommand.RUN, now=0.0)
     first = asked(runner, MoveJob, 0.0)
     assert "pause or abort" in runner.load(SCENARIO.removed(3), now=0.5)
-    runner.receive(Done(first.attempt), now=1.0)
+    runner.answer(first.attempt, now=1.0)
     runner.receive(ListCommand.PAUSE, now=1.5)
     edited = SCENARIO.moved(5, 0).changed(2, VoiceJob(SCENARIO.next_number, "Good day!"))
     assert runner.load(edited, now=2.0) == ""
@@ -277,7 +274,7 @@ class Doing(RuleBasedStateMachine):
     def answer(self, well: bool) -> None:
         attempt = self.open.pop()
         self.over.add(attempt)
-        self.runner.receive(Done(attempt) if well else JobFailed(attempt, "so"), now=self.now)
+        self.runner.answer(attempt, None if well else "so", now=self.now)
         self.take()
 
     @precondition(lambda self: self.over)
@@ -285,14 +282,14 @@ class Doing(RuleBasedStateMachine):
     def answer_late(self, data: st.DataObject, well: bool) -> None:
         before = self.runner.progress
         attempt = data.draw(st.sampled_from(sorted(self.over)))
-        self.runner.receive(Done(attempt) if well else JobFailed(attempt, "so"), now=self.now)
+        self.runner.answer(attempt, None if well else "so", now=self.now)
         assert self.runner.progress == before
 
-    @rule(message=st.sampled_from([OperatorLost("gone"), Interrupted("touched")]))
-    def trouble(self, message: OperatorLost | Interrupted) -> None:
-        self.runner.receive(message, now=self.now)
+    @rule(how=st.sampled_from(TROUBLES))
+    def trouble(self, how: Any) -> None:
+        how(self.runner, "trouble", now=self.now)
         self.take()
-        if isinstance(message, Interrupted) or self.runner.config.loss is OperatorLoss.STOP:
+        if how is JobRunner.interrupt or self.runner.config.loss is OperatorLoss.STOP:
             assert not self.open
 
     @rule(dt=st.sampled_from([0.1, 1.0, 10.0]))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Claim, Figure, Study
+from interfaces.lab.claims import Claim, Figure, Results, Study
 from interfaces.lab.doulgeri import (
     agreement,
     causality,
@@ -42,8 +42,16 @@ def only(claims: Iterable[Claim], *said: str) -> None:
     assert all(any(word in claim for claim in found) for word in said), found
 
 
+def but(seen: Results, **changes: Any) -> Results:
+    """The same, with other figures."""
+    assert changes.keys() <= vars(seen).keys()
+    return Results(**vars(seen) | changes)
+
+
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
-PREDICTED = delays.DelayResult((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SHARE)
+PREDICTED = Results(
+    lateness=(0.0, 0.0), postponed=0.0, ages=(0.0, 0.0, 0.0), shown=0.02, falsified=SHARE, foretold=SHARE
+)
 
 
 @pytest.mark.parametrize(
@@ -60,23 +68,24 @@ PREDICTED = delays.DelayResult((0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.02, SHARE, SH
 )
 def test_delays_of_predicted_frames(changes: dict[str, Any], said: list[str]) -> None:
     setting = delays.SETTINGS["-Df, predicted"]
-    only(delays.delay_claims(STUDY, setting, [PREDICTED._replace(**changes)] * 2), *said)
+    only(delays.delay_claims(STUDY, setting, [but(PREDICTED, **changes)] * 2), *said)
 
 
 def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
     setting = delays.SETTINGS["-Df"]
-    seen = PREDICTED._replace(ages=(0.5, 0.5, 0.5), falsified=0.0)
+    seen = but(PREDICTED, ages=(0.5, 0.5, 0.5), falsified=0.0)
     only(delays.delay_claims(STUDY, setting, [seen] * 2))
-    only(delays.delay_claims(STUDY, setting, [seen, seen._replace(falsified=0.01)]), "none being predicted")
+    only(delays.delay_claims(STUDY, setting, [seen, but(seen, falsified=0.01)]), "none being predicted")
     shares = np.tile(-np.expm1(-0.8 * np.array(delays.LEADS)), (3, 1))
     only(delays.lead_claims(STUDY, shares))
     only(delays.lead_claims(STUDY, 0.85 * shares), "0.1 s", "0.5 s", "1 s")
 
 
 NOWHERE = np.zeros((1, 3))
-HAND = dragging.DraggingResult(
-    0.005, 0.02, 0.05, 0.0, 1.0, 0, 200, 5e-4, 0.3, np.zeros(1), NOWHERE, NOWHERE, NOWHERE
-)
+HAND = Results(
+    following=0.005, largest=0.02, lag=0.05, answered=0.0, limits=1.0, rejected=0, inputs=200, real=5e-4,
+    real_lag=0.3, t=np.zeros(1), hand=NOWHERE, virtual=NOWHERE, robot=NOWHERE,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -94,32 +103,35 @@ HAND = dragging.DraggingResult(
 def test_dragging(changes: dict[str, Any], said: list[str]) -> None:
     only(dragging.conclude(STUDY, (HAND, HAND, None, None)).claims)
     # One hand of two: of the interval's end a quarter of the resamples are that one alone.
-    only(dragging.conclude(STUDY, (HAND, HAND._replace(**changes), None, None)).claims, *said)
+    only(dragging.conclude(STUDY, (HAND, but(HAND, **changes), None, None)).claims, *said)
 
 
 def test_encoding() -> None:
-    good = encoding.Sizes(120.0, 60.0, 100.0, 100.0, 1e-3, 0.0, 100.0, 300.0, 200.0, 1e-5)
+    good = Results(
+        frames=120.0, frames_single=60.0, segments=100.0, commands=100.0, between=1e-3, rebuilt=0.0, compact=100.0,
+        compact_each=300.0, absolute=200.0, compact_error=1e-5,
+    )  # fmt: skip
     only(encoding.conclude(STUDY, ([good] * 2,) * 3).claims)
     # One of the two is enough.
-    for other in (good._replace(segments=115.0), good._replace(compact=115.0)):
+    for other in (but(good, segments=115.0), but(good, compact=115.0)):
         only(encoding.conclude(STUDY, ([good] * 2, [good, other], [good] * 2)).claims)
-    both = good._replace(segments=115.0, compact=115.0)
+    both = but(good, segments=115.0, compact=115.0)
     only(encoding.conclude(STUDY, ([good] * 2, [good, both], [good] * 2)).claims, "the better of segments and")
-    dear = good._replace(frames=1000.0, segments=500.0, compact=435.0)
+    dear = but(good, frames=1000.0, segments=500.0, compact=435.0)
     only(
         encoding.conclude(STUDY, ([good] * 2, [good, dear], [good] * 2)).claims,
         "rates by hand, 50 inputs a second: the",
     )
     only(
-        encoding.conclude(STUDY, ([good, good._replace(rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
+        encoding.conclude(STUDY, ([good, but(good, rebuilt=1e-11)], [good] * 2, [good] * 2)).claims,
         "who has the segments",
     )
     only(
-        encoding.conclude(STUDY, ([good, good._replace(compact_error=1.1e-5)], [good] * 2, [good] * 2)).claims,
+        encoding.conclude(STUDY, ([good, but(good, compact_error=1.1e-5)], [good] * 2, [good] * 2)).claims,
         "who gets compact frames",
     )
     said = encoding.conclude(
-        STUDY, ([good, good._replace(commands=119.0)], [good] * 2, [good._replace(commands=140.0)] * 2)
+        STUDY, ([good, but(good, commands=119.0)], [good] * 2, [but(good, commands=140.0)] * 2)
     )
     only(said.claims, "a move every 2 s: bytes", "twist by hand, 50 inputs a second: bytes")
 
@@ -132,8 +144,11 @@ def test_the_readers_of_an_encoding_have_the_motion() -> None:
     assert found.compact < found.compact_each < found.frames < found.segments
 
 
-RUN = jitter.JitterResult(0.001, 0.002, 0.004, 1.0, 2.0, 1.0, 0.0, 0, 1.0, 1.05, 0, 10, 0)
-FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
+RUN = Results(
+    mean=0.001, p95=0.002, largest=0.004, time_difference=1.0, time_difference_max=2.0, progress=1.0, aside=0.0,
+    bursts=0, limits=1.0, pace=1.05, postponed=0, moves=10, corrections=0,
+)  # fmt: skip
+FIXED = but(RUN, mean=0.02, time_difference=3.0, postponed=1)
 
 
 @pytest.mark.parametrize(
@@ -150,16 +165,16 @@ FIXED = RUN._replace(mean=0.02, time_difference=3.0, postponed=1)
     ],
 )
 def test_jitter(changes: dict[str, Any], said: list[str]) -> None:
-    def claims(*adaptive: jitter.JitterResult) -> Sequence[Claim]:
-        result: Any = jitter.Result(-2.0, adaptive, (FIXED,) * 2, ())  # type: ignore[arg-type]
+    def claims(*adaptive: Results) -> Sequence[Claim]:
+        result = Results(D=-2.0, adaptive=adaptive, fixed=[FIXED] * 2, traces=())
         return jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims
 
     only(claims(RUN, RUN))
-    only(claims(RUN, RUN._replace(**changes)), *said)
+    only(claims(RUN, but(RUN, **changes)), *said)
 
 
 def test_a_fixed_offset_that_postpones_nothing_is_said_so() -> None:
-    result: Any = jitter.Result(-2.0, (RUN,) * 2, (FIXED._replace(postponed=0),) * 2, ())  # type: ignore[arg-type]
+    result = Results(D=-2.0, adaptive=[RUN] * 2, fixed=[but(FIXED, postponed=0)] * 2, traces=())
     only(jitter.conclude(STUDY, (result,) * len(jitter.CASES)).claims, "a fixed D postpones")
 
 
@@ -179,8 +194,11 @@ def test_the_fixed_offset_hides_what_95_percent_of_the_packets_take(monkeypatch:
     assert given == [None, -quantile] * 2
 
 
-AGREED = agreement.AgreementResult(1.0, 0.3, (0.1,), (0.5,), 0.1, 1.0, np.zeros(1), np.zeros(1))
-QUIET = AGREED._replace(corrections=(), durations=())
+AGREED = Results(
+    agreed=1.0, noticed=0.3, corrections=(0.1,), durations=(0.5,), unlinked=0.1, limits=1.0, t=np.zeros(1),
+    apart=np.zeros(1),
+)  # fmt: skip
+QUIET = but(AGREED, corrections=(), durations=())
 
 
 @pytest.mark.parametrize(
@@ -198,9 +216,12 @@ QUIET = AGREED._replace(corrections=(), durations=())
 )
 def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     good = {"late": AGREED, "blocked": AGREED, "lossless": QUIET, "lossy": QUIET}
-    bad = good | {case: good[case]._replace(**changes)}
+    bad = good | {case: but(good[case], **changes)}
     only(agreement.conclude(STUDY, tuple([seen] * 2 for seen in good.values())).claims)
     only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
+
+
+SPLICED = Results(position_jump=0.0, velocity_jump=0.0, tails=5, changed=0, uneven=0.0, past=0.0)
 
 
 @pytest.mark.parametrize(
@@ -215,7 +236,7 @@ def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     ],
 )
 def test_segments(changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = segments.Spliced(0.0, 0.0, 5, 0, 0.0, 0.0)._replace(**changes)
+    seen = but(SPLICED, **changes)
     monkeypatch.setattr(segments, "splice", lambda _: seen)
     only(segments.work(STUDY, "").claims, *said)
 
@@ -229,9 +250,10 @@ def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
     only(causality.work(STUDY, "").claims, "D = 0: postponed")
 
 
-SCRUBBED = interactivity.Scrubbed(
-    {ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, 0.0, (8.0, 1.5, 1.5), 0.0, (0.0,), (0.0,)
-)
+SCRUBBED = Results(
+    seek={ViewForm.SEGMENTS: 0.01, ViewForm.FRAMES: 0.28}, dragged=0.0, live=(8.0, 1.5, 1.5), others=0.0, t=(0.0,),
+    place=(0.0,),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -251,5 +273,5 @@ def test_interactivity(
     edit: dict[str, float], changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interactivity, "edits", lambda _: dict.fromkeys(interactivity.EDITS, 0.25) | edit)
-    monkeypatch.setattr(interactivity, "scrub", lambda _: SCRUBBED._replace(**changes))
+    monkeypatch.setattr(interactivity, "scrub", lambda _: but(SCRUBBED, **changes))
     only(interactivity.work(STUDY, "").claims, *said)

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Claim, Findings, Study
+from interfaces.lab.claims import Claim, Findings, Results, Study
 from interfaces.lab.driving.run import run
 from interfaces.lab.han2001 import PAPER, architectures, information
-from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, ArchitectureResult, ArchitectureSummary
+from interfaces.lab.han2001.architectures import CASES, REPEATED, STREAMED, ArchitectureResult
 from interfaces.teleop.architectures import Transport
 from vrs.comparison import PathComparison
 
@@ -77,9 +77,11 @@ def concluded(
     both = runs, runs if others is None else others
     simulated = [them | {"II": them.get(SIMULATED, made(0.001, 6.0))} for them in both]
     results = tuple(
-        ArchitectureSummary(
-            {who: tuple(them[who] for them in (simulated if case.startswith("model") else both)) for who in GOOD},
-            {},
+        Results(
+            runs={
+                who: tuple(them[who] for them in (simulated if case.startswith("model") else both)) for who in GOOD
+            },
+            first={},
         )
         for case in CASES
     )

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Study
+from interfaces.lab.claims import Results, Study
 from interfaces.lab.kim2006 import PAPER, links, packets
-from interfaces.lab.kim2006.following import Followed, FollowingCase, PathLeader, course, run
-from interfaces.lab.kim2006.links import LinkResult, Pair, pair
+from interfaces.lab.kim2006.following import Followed, FollowingCase, course, path_leader, run
+from interfaces.lab.kim2006.links import pair, verdict
 from interfaces.rsp.schemes import SCHEMES, ReportedPosition
 from vrs.errors import InvalidValueError
 
@@ -69,11 +69,11 @@ def test_a_lost_packet_holds_up_tcp_and_loses_commands_without_acknowledgement()
 
 def test_the_leader_has_no_error_of_its_own() -> None:
     path = course(3, 20.0)
-    leader = PathLeader(path)
+    lead = path_leader(path)
     x, y, theta = 0.0, 0.05, 0.3
     far = []
     for _ in range(900):
-        left, right = leader.rims(ReportedPosition(x, y, theta))
+        left, right = lead(ReportedPosition(x, y, theta))
         v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / 0.15
         x, y, theta = x + 0.02 * v * math.cos(theta), y + 0.02 * v * math.sin(theta), theta + 0.02 * w
         far.append(float(np.linalg.norm(path - (x, y), axis=1).min()))
@@ -117,21 +117,21 @@ def test_the_error_until_a_cell_is_the_mean_up_to_where_it_was_reached() -> None
 
 
 def test_the_verdict_is_the_paired_intervals() -> None:
-    assert Pair((0.01, 0.011), (0.02, 0.021)).verdict == "rsp"
-    assert Pair((0.02, 0.021), (0.01, 0.011)).verdict == "other"
-    assert Pair((0.02, 0.021), (0.0201, 0.0205)).verdict == "equal"
-    assert Pair((0.02, 0.001), (0.001, 0.04)).verdict == "unclear"
-    assert Pair((), ()).verdict == "the other never moved"
-    assert pair([followed(0.1, 50)], [followed(0.2, 1)]).rsp == ()
-    assert pair([followed(0.1, 50)], [followed(0.2, 30)]) == Pair((pytest.approx(0.1),), (pytest.approx(0.2),))
+    assert verdict((0.01, 0.011), (0.02, 0.021)) == "rsp"
+    assert verdict((0.02, 0.021), (0.01, 0.011)) == "other"
+    assert verdict((0.02, 0.021), (0.0201, 0.0205)) == "equal"
+    assert verdict((0.02, 0.001), (0.001, 0.04)) == "unclear"
+    assert verdict((), ()) == "the other never moved"
+    assert pair([followed(0.1, 50)], [followed(0.2, 1)]) == ((), ())
+    assert pair([followed(0.1, 50)], [followed(0.2, 30)]) == ((pytest.approx(0.1),), (pytest.approx(0.2),))
 
 
 def test_a_claim_fails_where_tcp_is_nearer() -> None:
-    worse = LinkResult("mon", 0.1, dict.fromkeys(SCHEMES, (0.01,) * 8), {"tcp": Pair((0.02, 0.021), (0.01, 0.011))})
+    pairs = dict.fromkeys(("tcp", "fixed", "repeated"), ((0.02, 0.021), (0.01, 0.011)))
+    mean = links.mean_of([followed(0.01, 1)])
+    worse = Results(delay="mon", loss=0.1, means=dict.fromkeys(SCHEMES, mean), pairs=pairs)
     assert not links.wins_claim(worse).holds
-    rows = links.wins_table(
-        [LinkResult(*worse[:3], dict.fromkeys(("tcp", "fixed", "repeated"), worse.pairs["tcp"]))]
-    ).rows
+    rows = links.wins_table([worse]).rows
     assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]
 
 
@@ -139,11 +139,9 @@ def test_narrow_links_are_concluded_by_the_ages() -> None:
     def made(age: float) -> list[tuple[float, ...]]:
         return [(0.01, 0.02, 1.0, age + 0.001 * k, 0.1, 0.0, 1.0, 1.0) for k in range(3)]
 
-    good = tuple(
-        links.BandwidthResult(made(0.1), made(4.0 if case == "16" else 0.1)) for case in links.NARROW_CASES
-    )
+    good = tuple((made(0.1), made(4.0 if case == "16" else 0.1)) for case in links.NARROW_CASES)
     assert all(claim.holds for claim in links.conclude_narrow(SMALL, good).claims)
-    bad = tuple(links.BandwidthResult(made(0.5), made(0.1)) for _ in links.NARROW_CASES)
+    bad = tuple((made(0.5), made(0.1)) for _ in links.NARROW_CASES)
     assert not any(claim.holds for claim in links.conclude_narrow(SMALL, bad).claims)
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands
 from interfaces.val2.monitor.commands import COMMANDS, command
 from interfaces.val2.monitor.state import unique
+
+from .sitting import HELLO
 
 
 def test_every_command_has_a_handler_and_a_line_of_help():
@@ -64,9 +68,22 @@ def test_an_instruction_or_an_assignment_at_the_prompt_says_what_to_type(sitting
 
 def test_every_word_can_be_explained(sitting):
     for name in COMMANDS:
-        assert next(commands.explained(name))[2]
+        assert next(commands.explained(name)).help
     assert "behind a location" in sitting.type("HELP APPRO")
     assert "DRY.RUN" in sitting.type("HELP dry")
     assert sitting.type("HELP xyzzy").startswith("*Unknown word*")
     for line in sitting.type("HELP").splitlines():
         assert len(line) <= 79
+
+
+@pytest.mark.parametrize("row", [row for row in COMMANDS.values() if row.act is not None], ids=lambda row: row.name)
+def test_each_row_has_a_wrong_use_words_that_may_follow_and_its_short_forms(sitting, row):
+    sitting.shown = ""
+    assert re.fullmatch(r"\*[A-Z][a-z -]+\* .+\n", sitting.line(f"{row.name} )"))
+    assert sitting.monitor.prompt == "."
+    sitting.type("ENABLE POWER", *HELLO, "DO x = 1", "DO SET p = NULL", 'DO $s = "a"', "STORE f")
+    _, words = sitting.monitor.suggestions(f"{row.name} ")
+    takes_words = row.forms not in {"", "| n"} or (row.more and row.name == "DIRECTORY")
+    assert bool(words) == bool(takes_words)
+    for short in row.short.split():
+        assert command(short) is row

@@ -19,7 +19,6 @@ from interfaces.val2.syntax import (
     BLANK,
     Apply,
     Format,
-    Ignored,
     Instruction,
     Number,
     Text,
@@ -176,10 +175,10 @@ def test_heads_ends_and_line_ends(ends, head, last):
 
 
 def test_what_has_no_meaning_is_kept_as_it_is_written():
-    assert statement('ATTACH (lun, 4) "SERIAL:1" ;x') == Ignored("ATTACH", '(lun, 4) "SERIAL:1"')
-    assert statement("weave 3,1") == Ignored("WEAVE", "3,1")
-    assert statement("PARAMETER not.ours = 3") == Ignored("PARAMETER", "not.ours = 3")
-    assert all(isinstance(statement(keyword), Ignored) for keyword in forms.IGNORED)
+    assert statement('ATTACH (lun, 4) "SERIAL:1" ;x') == Instruction("ATTACH", passed='(lun, 4) "SERIAL:1"')
+    assert statement("weave 3,1") == Instruction("WEAVE", passed="3,1")
+    assert statement("PARAMETER not.ours = 3") == Instruction("PARAMETER", passed="not.ours = 3")
+    assert all(statement(keyword).passed is not None for keyword in forms.IGNORED)
 
 
 def test_words_are_keywords_only_where_they_can_stand():

@@ -7,7 +7,7 @@ import string
 from hypothesis import strategies as st
 
 from interfaces.val2 import forms
-from interfaces.val2.functions import row_of
+from interfaces.val2.functions import OPERATORS, row_of
 from interfaces.val2.parser import LONGEST_LINE
 from interfaces.val2.printer import print_step
 from interfaces.val2.syntax import (
@@ -15,7 +15,6 @@ from interfaces.val2.syntax import (
     Apply,
     Compound,
     Format,
-    Ignored,
     Instruction,
     Number,
     Program,
@@ -43,7 +42,7 @@ formats = st.builds(
     st.none() | st.integers(0, 999),
     st.none() | st.integers(0, 99),
 )
-OPERATORS = sorted(forms.LEVELS)
+BETWEEN_TWO = sorted(name for name, row in OPERATORS.items() if len(row.slots) == 2)
 
 
 def variables(inner, named=names):
@@ -80,7 +79,7 @@ def larger(inner):
     loose = inner.filter(lambda e: not isinstance(e, Compound))
     return (
         st.builds(Apply, st.sampled_from(["-", "NOT", "COM"]), st.tuples(inner))
-        | st.builds(Apply, st.sampled_from(OPERATORS), st.tuples(inner, inner))
+        | st.builds(Apply, st.sampled_from(BETWEEN_TWO), st.tuples(inner, inner))
         | st.builds(Compound, st.lists(loose, min_size=2, max_size=4).map(tuple))
         | variables(inner)
         | applications(inner)
@@ -199,9 +198,9 @@ statements = st.one_of(
         st.lists(variables(numbers), min_size=1, max_size=3),
         words=st.sampled_from([(), ("REAL",), ("LOC",)]),
     ),
-    st.builds(Ignored, ignored, rests),
-    st.just(Ignored("DISABLE", "color.speed, scale")),
-    st.just(Ignored("PARAMETER", "vscale = 3")),
+    st.builds(Instruction, ignored, passed=rests),
+    st.just(Instruction("DISABLE", passed="color.speed, scale")),
+    st.just(Instruction("PARAMETER", passed="vscale = 3")),
 )
 comments = st.none() | st.text(
     st.characters(blacklist_characters="\r\n", blacklist_categories=["Cs"]), max_size=20
