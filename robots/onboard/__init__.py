@@ -4,9 +4,6 @@ from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline
 from robots.onboard.command_filter import (
     CommandFilter,
     CommandFilterConfig,
-    FilterEvent,
-    FilterEventKind,
-    FilterOutput,
 )
 from robots.onboard.curve import Curve, CurveKind, CurvePoint, load_curve, read_curve
 from robots.onboard.curve_trackers import (
@@ -84,9 +81,6 @@ __all__ = [
     "ExtractionConfig",
     "FeedForward",
     "FieldLaw",
-    "FilterEvent",
-    "FilterEventKind",
-    "FilterOutput",
     "FollowingAbort",
     "Found",
     "FrameReader",

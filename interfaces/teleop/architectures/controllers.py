@@ -67,9 +67,8 @@ class Filtered(DriveController):
     @override
     def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Drive what the filter gave out last, for as long as the operator did."""
-        for output in self._filter.advance(now=now + _ROUNDING):
-            arc = output.command
-            self._drive, self._until = Drive(arc.v, arc.w), output.t + arc.duration
+        for t, arc in self._filter.advance(now=now + _ROUNDING):
+            self._drive, self._until = Drive(arc.v, arc.w), t + arc.duration
             self.executed += 1
         return self._drive if now < self._until - _ROUNDING else STAND
 
@@ -106,8 +105,7 @@ class FollowingController(DriveController):
 
     def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Lengthen the path, and follow it."""
-        for output in self._filter.advance(now=now + _ROUNDING):
-            arc = output.command
+        for _, arc in self._filter.advance(now=now + _ROUNDING):
             self._generator.receive(arc.v, arc.w, duration=arc.duration)
             self._ends.append(self._path.length)
         drive = self._controller.control(posture, v_before=v_before)
