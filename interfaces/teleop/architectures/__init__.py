@@ -25,11 +25,10 @@ from interfaces.teleop.architectures.sites import (
     PositionSource,
     Transport,
 )
-from interfaces.teleop.architectures.surroundings import Aim, OperatorSurroundings, RobotSurroundings, Sonar
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 
 __all__ = [
     "ARCHITECTURES",
-    "Aim",
     "Architecture",
     "ArchitectureOperatorSite",
     "ArchitectureRobotSite",
@@ -42,7 +41,6 @@ __all__ = [
     "PlayerConfig",
     "PositionSource",
     "RobotSurroundings",
-    "Sonar",
     "TimelineController",
     "Transport",
     "architecture",

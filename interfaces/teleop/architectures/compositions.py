@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Final, TypeAlias
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.system import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
@@ -19,7 +18,7 @@ from interfaces.teleop.architectures.controllers import (
     TimelineController,
 )
 from interfaces.teleop.architectures.sites import DriveController, PositionSource
-from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings, Sonar
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.base import MobileBase
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.floor_plan import FloorPlan
@@ -123,17 +122,10 @@ MARGIN = 0.02
 """Of the virtual robot's circle round the real one's outline [m]."""
 
 
-class BodySonar(Sonar):
-    """A real robot's sonars."""
-
-    def __init__(self, body: MobileRobot, since: float = 0.0) -> None:
-        """Take the robot; times count from `since` [s] of its own."""
-        self._body, self._since = body, since
-
-    @override
-    def scan(self) -> tuple[float, Sequence[float]] | None:
-        scan = self._body.sonar
-        return None if scan is None else (scan.time - self._since, scan.ranges.tolist())
+def echoes_of(body: MobileRobot, since: float) -> tuple[float, Sequence[float]] | None:
+    """When a robot's newest sonar scan was taken, from `since` on [s], and its ranges [m]; None without one."""
+    scan = body.sonar
+    return None if scan is None else (scan.time - since, scan.ranges.tolist())
 
 
 def grid_of(room: Room, start: Posture) -> Grid:
@@ -182,12 +174,12 @@ def robot_surroundings(
     careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
     avoidance = ObstacleAvoidance(careful)
     return RobotSurroundings(
-        BodySonar(body, since),
+        lambda: echoes_of(body, since),
         EnvironmentSupervisor(grid, _known(body.room, grid, body.chassis.sonar_height), seen),
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
-        controller if isinstance(controller, FollowingController) else None,
+        controller.aim if isinstance(controller, FollowingController) else None,
     )
 
 

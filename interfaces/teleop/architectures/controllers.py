@@ -116,22 +116,17 @@ class FollowingController(DriveController):
             self.executed += 1
         return drive
 
-    @property
-    def direction(self) -> float:
-        """Where the field pointed at the last call [rad]."""
-        return self._controller.direction
+    def aim(self) -> tuple[float, float, tuple[float, float] | None]:
+        """Tell where it wanted to get at the last call.
 
-    @property
-    def left(self) -> float:
-        """Way on the known path to where the robot is to stand [m], as at the last call."""
+        Returns:
+            Where the field pointed [rad]; the way on the known path to where the robot is to stand [m]; and where
+            on the path it should be [m], None before the first call.
+        """
         place = self._controller.projection
-        return 0.0 if place is None else place.to_stop
-
-    @property
-    def nearest(self) -> tuple[float, float] | None:
-        """Where on the path the robot should be [m], as at the last call; None before it."""
-        place = self._controller.projection
-        return None if place is None else (place.x, place.y)
+        if place is None:
+            return self._controller.direction, 0.0, None
+        return self._controller.direction, place.to_stop, (place.x, place.y)
 
 
 @dataclass(frozen=True, slots=True)
