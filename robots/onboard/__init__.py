@@ -32,13 +32,13 @@ from robots.onboard.laser import (
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import LineFilter, MatchingConfig, MotionConfig
-from robots.onboard.localization import LocalizationConfig, Observability, PaperConfig, PaperLocalizer, Tracker
+from robots.onboard.localization import LocalizationConfig, Observability, PaperLocalizer, Tracker
 from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
 from robots.onboard.map_building import BuildingConfig, MapBuilder, Surveyor
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker, Yielding, YieldingConfig
-from robots.onboard.navigator import Navigator, NavigatorConfig
+from robots.onboard.navigator import Navigator
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
-from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot, Projection
+from robots.onboard.path import Arc, MovingPath, PathGenerator, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap, RouteProblem
 from robots.onboard.servo import FeedForward, Servo, ServoGains, StopMotion, from_commanded, from_measured
@@ -115,7 +115,6 @@ __all__ = [
     "MoversConfig",
     "MovingPath",
     "Navigator",
-    "NavigatorConfig",
     "NoRoute",
     "Observability",
     "ObstacleAvoidance",
@@ -123,12 +122,10 @@ __all__ = [
     "ObstacleMapConfig",
     "OdometryTrack",
     "Outline",
-    "PaperConfig",
     "PaperLocalizer",
     "PathFollowingConfig",
     "PathFollowingController",
     "PathGenerator",
-    "PathGeneratorConfig",
     "Pending",
     "Pivot",
     "Posture",

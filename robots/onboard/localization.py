@@ -252,19 +252,12 @@ def step_between(before: tuple[float, float, float], after: tuple[float, float, 
     return (dx * math.cos(middle) + dy * math.sin(middle)) / sinc(0.5 * turn), turn
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class PaperConfig:
-    """What the paper leaves open."""
-
-    turn: Annotated[float, within(0.01, 1.5)] = 0.3
-    """Lines correspond if they differ by no more [rad], in [0.01, 1.5]."""
-    across: Annotated[float, within(0.01, 10.0)] = 0.3
-    """Nor by more across [m], in [0.01, 10]."""
-    rounds: Annotated[int, within(1, 1000)] = 20
-    """Of eq. (9), at most, in [1, 1000]."""
-    enough: Annotated[float, within(0.0, 1.0)] = 1e-4
-    """A round that changes less ends it [m, rad], in [0, 1]."""
+_TURN, _ACROSS = 0.3, 0.3
+"""The paper's lines correspond if they differ by no more [rad], [m]; it leaves this open, and what follows."""
+_ROUNDS = 20
+"""Of eq. (9), at most."""
+_ENOUGH = 1e-4
+"""A round that changes less ends it [m, rad]."""
 
 
 def differences(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array:
@@ -296,13 +289,13 @@ def injected_update(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array
     return np.asarray(np.einsum("k,kij,kj->i", weights(known, placed, of), R, differences(known, placed, of)))
 
 
-def nearest_lines(known: Lines, placed: Lines, config: PaperConfig) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def nearest_lines(known: Lines, placed: Lines) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Seen lines, in the world frame, and the nearest lines of the map that they may be."""
     turn = all_wrapped(placed.poses[:, None, 2] - known.poses[:, 2])
     delta = placed.poses[:, None, :2] - known.poses[:, :2]
     along, off = np.sum(delta * known.directions, axis=-1), np.abs(np.sum(delta * known.normals, axis=-1))
     beside = (along >= known.spans[:, 0]) & (along <= known.spans[:, 1])
-    cost = np.where((np.abs(turn) < config.turn) & (off < config.across) & beside, off, np.inf)
+    cost = np.where((np.abs(turn) < _TURN) & (off < _ACROSS) & beside, off, np.inf)
     if not cost.size:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     of = cost.argmin(axis=1)
@@ -313,19 +306,12 @@ def nearest_lines(known: Lines, placed: Lines, config: PaperConfig) -> tuple[NDA
 class PaperLocalizer:
     """Dead reckoning, corrected by the paper's update after each scan."""
 
-    def __init__(
-        self,
-        known: GspMap,
-        posture: tuple[float, float, float],
-        config: PaperConfig | None = None,
-        extraction: ExtractionConfig | None = None,
-    ) -> None:
+    def __init__(self, known: GspMap, posture: tuple[float, float, float]) -> None:
         """Begin at a posture (x, y, θ) [m, m, rad] in a map."""
         self._known = known.lines
         self.posture = posture
         """Where the robot is taken to be, (x, y, θ) [m, m, rad]."""
-        self._config = PaperConfig() if config is None else config
-        self._extraction = ExtractionConfig() if extraction is None else extraction
+        self._extraction = ExtractionConfig()
         self.odometry = OdometryTrack()
         self._scanned = -math.inf
 
@@ -345,14 +331,14 @@ class PaperLocalizer:
             return False
         self._scanned = scan.time
         seen = extract(deskewed(scan, self.odometry), self._extraction).lines
-        for _ in range(self._config.rounds):
+        for _ in range(_ROUNDS):
             placed = seen.moved(self.posture)
-            mine, of = nearest_lines(self._known, placed, self._config)
+            mine, of = nearest_lines(self._known, placed)
             if not len(mine):
                 break
             step = injected_update(self._known, placed.taken(mine), of)
             x, y, theta = self.posture
             self.posture = x + float(step[0]), y + float(step[1]), theta + float(step[2])
-            if np.abs(step).max() < self._config.enough:
+            if np.abs(step).max() < _ENOUGH:
                 break
         return True

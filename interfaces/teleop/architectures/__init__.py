@@ -15,7 +15,6 @@ from interfaces.teleop.architectures.controllers import (
     Filtered,
     FollowingController,
     Immediate,
-    PlayerConfig,
     TimelineController,
 )
 from interfaces.teleop.architectures.sites import (
@@ -38,7 +37,6 @@ __all__ = [
     "FollowingController",
     "Immediate",
     "OperatorSurroundings",
-    "PlayerConfig",
     "PositionSource",
     "RobotSurroundings",
     "TimelineController",

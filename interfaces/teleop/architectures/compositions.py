@@ -14,7 +14,6 @@ from interfaces.teleop.architectures.controllers import (
     Filtered,
     FollowingController,
     Immediate,
-    PlayerConfig,
     TimelineController,
 )
 from interfaces.teleop.architectures.sites import DriveController, PositionSource
@@ -46,8 +45,6 @@ class Constants:
     """T_p: to make a piece of the path of one command [s], shorter than T."""
     following: PathFollowingConfig = field(default_factory=PathFollowingConfig)
     """Of the uni-vector field, III."""
-    player: PlayerConfig = field(default_factory=PlayerConfig)
-    """Of the `timeline` architecture."""
 
     def __post_init__(self) -> None:
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
@@ -58,9 +55,7 @@ Architecture: TypeAlias = Callable[[Constants, Posture], DriveController]
 
 
 def _following(law: FieldLaw) -> Architecture:
-    return lambda c, posture: FollowingController(
-        posture, law, c.following, period=c.period, processing=c.processing
-    )
+    return lambda c, posture: FollowingController(posture, law, c.following, processing=c.processing)
 
 
 ARCHITECTURES: Final[dict[str, Architecture]] = {
@@ -69,7 +64,7 @@ ARCHITECTURES: Final[dict[str, Architecture]] = {
     "III": _following(FieldLaw.LITERAL),
     "III-capped": _following(FieldLaw.CAPPED),
     "extended": _following(FieldLaw.CAPPED),
-    "timeline": lambda c, posture: TimelineController(posture, now=0.0, config=c.player),
+    "timeline": lambda _, posture: TimelineController(posture, now=0.0),
 }
 """What makes each architecture's controller."""
 

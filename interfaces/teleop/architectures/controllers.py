@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from typing_extensions import override
 
@@ -17,13 +16,16 @@ from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
-from robots.onboard.path import MovingPath, PathGenerator, PathGeneratorConfig
+from robots.onboard.path import MovingPath, PathGenerator
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
+from robots.onboard.trajectory_tracking import Reference, TrajectoryTracker
 from vrs.segment import ArcSegment
 
 STARVED = 0.5
 """Architecture I holds a command until the next, but no longer than this [s]: the robot's watchdog."""
+_OFFSET = OffsetConfig(share=0.6)
+"""Of D, one set for every delay. What comes later than that share makes the robot slow down and catch up, but not
+leave the path: so D needn't cover the longest delays."""
 _ROUNDING = 1e-9
 """Times nearer than this [s] are one."""
 
@@ -76,21 +78,18 @@ class Filtered(DriveController):
 class FollowingController(DriveController):
     """Architecture III: the filter at T_p feeds the path generator; the uni-vector field follows the path."""
 
-    def __init__(
-        self, posture: Posture, law: FieldLaw, config: PathFollowingConfig, *, period: float, processing: float
-    ) -> None:
+    def __init__(self, posture: Posture, law: FieldLaw, config: PathFollowingConfig, *, processing: float) -> None:
         """Begin a path.
 
         Args:
             posture: Where it begins.
             law: Eq. (14)–(15) literally, or capped.
             config: Of the field.
-            period: T, what a command lasts [s].
             processing: T_p, what one takes to become a piece of the path [s].
         """
         self._filter: CommandFilter[ArcSegment] = CommandFilter(CommandFilterConfig(processing))
         self._path = MovingPath(posture)
-        self._generator = PathGenerator(self._path, PathGeneratorConfig(period))
+        self._generator = PathGenerator(self._path)
         self._controller = PathFollowingController(self._path, config, law=law)
         self._arrival = config.arrival
         self._ends: deque[float] = deque()
@@ -129,24 +128,13 @@ class FollowingController(DriveController):
         return self._controller.direction, place.to_stop, (place.x, place.y)
 
 
-@dataclass(frozen=True, slots=True)
-class PlayerConfig:
-    """How the `timeline` architecture plays. One set serves every delay."""
-
-    tracking: TrackingConfig = field(default_factory=TrackingConfig)
-    offset: OffsetConfig = field(default_factory=lambda: OffsetConfig(share=0.6))
-    """Of D. What comes later than that share makes the robot slow down and catch up, but not leave the path: so D
-    needn't cover the longest delays."""
-
-
 class TimelineController:
     """Architecture `timeline`: plays the operator's path D behind him, D adaptive, and tracks it."""
 
-    def __init__(self, posture: Posture, *, now: float, config: PlayerConfig) -> None:
+    def __init__(self, posture: Posture, *, now: float) -> None:
         """Begin where the operator's path does, by the robot's clock at `now` [s]."""
-        self._config = config
-        self._tracker = TrajectoryTracker(posture, 0.0, now=now, config=config.tracking)
-        self._offset = AdaptiveOffset(config.offset)
+        self._tracker = TrajectoryTracker(posture, 0.0, now=now)
+        self._offset = AdaptiveOffset(_OFFSET)
         self.D: float | None = None
         """How far behind the robot's clock it plays, D ≤ 0 [s]; None before the first packet."""
         self._ends: deque[float] = deque()
