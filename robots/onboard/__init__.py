@@ -17,7 +17,7 @@ from robots.onboard.curve_trackers import (
 )
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, SensorFault, SensorMonitor, too_far
-from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
+from robots.onboard.global_localization import Candidate, SearchConfig, Surroundings, locate
 from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
 from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
 from robots.onboard.laser import (
@@ -61,7 +61,6 @@ from robots.onboard.watchdog import (
 
 __all__ = [
     "AcceptedFuture",
-    "Answer",
     "Arc",
     "AvoidanceConfig",
     "Backwards",
@@ -82,7 +81,6 @@ __all__ = [
     "FeedForward",
     "FieldLaw",
     "FollowingAbort",
-    "Found",
     "FrameReader",
     "GoOn",
     "Goal",

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from robots.onboard.gsp_map import GspMap, Lines, injection
 from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
-from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
+from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
 from vrs.checks import validated, within
 from vrs.mobile import advanced, wrapped
@@ -132,10 +132,8 @@ class Tracker:
         """Of the ranges, as the scans show it [m]."""
         self.sights: Sights | None = None
         """What was recognised in the last scan."""
-        self.extraction: Extraction | None = None
-        """What lines it had."""
         self.seen = Lines.none()
-        """The same lines, in the robot's frame, with all of their doubt."""
+        """All lines of the last scan, in the robot's frame, with all of their doubt."""
         self.points: Points | None = None
         """What it saw, in the robot's frame when it was taken in."""
         self.seen_from = posture
@@ -180,17 +178,17 @@ class Tracker:
             return False
         self._scanned = scan.time
         self.points = points = deskewed(scan, self.odometry)
-        self.extraction = found = extract(points, self._config.extraction, self.noise)
-        if math.isfinite(found.noise):
-            self.noise += 0.1 * (min(max(found.noise, 1e-3), 0.1) - self.noise)
-        self._take(found)
+        lines, noise = extract(points, self._config.extraction, self.noise)
+        if math.isfinite(noise):
+            self.noise += 0.1 * (min(max(noise, 1e-3), 0.1) - self.noise)
+        self._take(lines)
         return True
 
-    def _take(self, found: Extraction) -> None:
+    def _take(self, lines: Lines) -> None:
         config = self._config
         alike = self._alike(self.filter.posture)
         floors = alike * np.array([config.across_floor**2, config.turn_floor**2])
-        seen = self.seen = replace(found.lines, variances=frozen_array(found.lines.variances + floors))
+        seen = self.seen = replace(lines, variances=frozen_array(lines.variances + floors))
         turned = (_BENT * self.odometry.bend) ** 2
         sights = matched(self.filter, seen, config.matching, turned)
         if len(seen) > len(sights.of):
@@ -330,7 +328,7 @@ class PaperLocalizer:
         if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
             return False
         self._scanned = scan.time
-        seen = extract(deskewed(scan, self.odometry), self._extraction).lines
+        seen, _ = extract(deskewed(scan, self.odometry), self._extraction)
         for _ in range(_ROUNDS):
             placed = seen.moved(self.posture)
             mine, of = nearest_lines(self._known, placed)

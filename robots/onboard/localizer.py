@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from robots.onboard.global_localization import Answer, Candidate, SearchConfig, locate
+from robots.onboard.global_localization import Candidate, SearchConfig, locate
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.laser import LaserScan, OdometryTrack
 from robots.onboard.line_filter import evidence
@@ -236,15 +236,13 @@ class Localizer:
         if not enough and now < self._since + config.patience:
             return
         self._looked = now
-        found = locate(self._known, surveyor.surroundings(), config.search)
-        self._candidates = found.candidates
-        if found.answer is Answer.UNIQUE:
-            if self._confirmed(found.candidates[0], surveyor):
-                self._go_on(found.candidates[0], surveyor)
-            else:
-                self._surveyor = Surveyor()
+        places = self._candidates = locate(self._known, surveyor.surroundings(), config.search)
+        if len(places) != 1:
+            self._becomes(Status.AMBIGUOUS if places else Status.SEARCHING)
+        elif self._confirmed(places[0], surveyor):
+            self._go_on(places[0], surveyor)
         else:
-            self._becomes(Status.AMBIGUOUS if found.answer is Answer.AMBIGUOUS else Status.SEARCHING)
+            self._surveyor = Surveyor()
 
     def _confirmed(self, place: Candidate, surveyor: Surveyor) -> bool:
         """Whether the last scan fits there, too: a robot that was held has lost itself in its own frame."""
