@@ -21,7 +21,6 @@ from interfaces.teleop.architectures.sites import (
     ArchitectureOperatorSite,
     ArchitectureRobotSite,
     DriveController,
-    PositionSource,
     Transport,
 )
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
@@ -37,7 +36,6 @@ __all__ = [
     "FollowingController",
     "Immediate",
     "OperatorSurroundings",
-    "PositionSource",
     "RobotSurroundings",
     "TimelineController",
     "Transport",

@@ -16,7 +16,7 @@ from interfaces.teleop.architectures.controllers import (
     Immediate,
     TimelineController,
 )
-from interfaces.teleop.architectures.sites import DriveController, PositionSource
+from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.base import MobileBase
 from robots.bullet.rooms import EMPTY, Room
@@ -27,6 +27,7 @@ from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, 
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
+from robots.onboard.following import PositionSource
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig

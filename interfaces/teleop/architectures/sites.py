@@ -12,6 +12,7 @@ from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, A
 from interfaces.messages.recording import CommandRecord
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.following import PositionSource
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
 from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
@@ -64,13 +65,6 @@ class DriveController(Protocol):
 
     executed: int
     """Index j of eq. (9): how many of the operator's commands the robot has executed."""
-
-
-class PositionSource(Protocol):
-    """Whatever tells a robot where it is."""
-
-    def posture(self) -> Posture:
-        """(x, y, θ) [m, m, rad], now."""
 
 
 class ArchitectureOperatorSite:
