@@ -139,8 +139,10 @@ class MovingPath:
             raise InvalidValueError("capacity", capacity, "a positive integer")
         self._capacity = capacity
         self._pieces: deque[_Piece] = deque()
-        self._end = Posture(*(finite("start", value) for value in start))
-        self._s = 0.0
+        self.end = Posture(*(finite("start", value) for value in start))
+        """The robot's posture at the end of the path."""
+        self.length = 0.0
+        """Way from the path's beginning to its end, with what is forgotten [m]."""
         self._stops: deque[float] = deque()
         self._at = 0.0
         self._theta: float | None = None
@@ -149,16 +151,6 @@ class MovingPath:
     def __len__(self) -> int:
         """How many pieces are kept."""
         return len(self._pieces)
-
-    @property
-    def end(self) -> Posture:
-        """The robot's posture at the end of the path."""
-        return self._end
-
-    @property
-    def length(self) -> float:
-        """Way from the path's beginning to its end, with what is forgotten [m]."""
-        return self._s
 
     def append(self, piece: PathPiece, *, end: Posture | None = None) -> bool:
         """Add a piece at the end.
@@ -176,17 +168,17 @@ class MovingPath:
         elif len(self._pieces) >= self._capacity:
             return False
         else:
-            added = _Piece(piece, self._end, self._s, last.direction if last is not None else 1)
+            added = _Piece(piece, self.end, self.length, last.direction if last is not None else 1)
             if last is not None and not last.pivots and (added.pivots or added.direction != last.direction):
-                self._stops.append(self._s)
+                self._stops.append(self.length)
             self._pieces.append(added)
             last = added
         if isinstance(piece, Arc):
-            self._s += piece.length
+            self.length += piece.length
         if end is None:
             turned = last.start._replace(theta=last.start.theta + last.amount)
             end = turned if last.pivots else last.at(last.amount)
-        last.end = self._end = end
+        last.end = self.end = end
         return True
 
     def locate(self, posture: tuple[float, float, float]) -> Projection:
@@ -201,7 +193,7 @@ class MovingPath:
         x, y, theta = posture
         pieces = self._pieces
         if not pieces:
-            return self._beside(x, y, self._end, 0.0, 0.0, 1, None)
+            return self._beside(x, y, self.end, 0.0, 0.0, 1, None)
         piece = pieces[0]
         while not piece.pivots:
             self._at = _nearest(piece, self._at, x, y)
@@ -266,7 +258,7 @@ class MovingPath:
     ) -> Projection:
         theta_d = place.theta if direction > 0 else place.theta + math.pi
         lateral = (y - place.y) * math.cos(theta_d) - (x - place.x) * math.sin(theta_d)
-        left = self._s - s
+        left = self.length - s
         to_stop = 0.0 if turn is not None else (self._stops[0] - s if self._stops else left)
         return Projection(s, place.x, place.y, theta_d, lateral, curvature, direction, left, to_stop, turn)
 
