@@ -27,10 +27,9 @@ from interfaces.rsp.session import (
     TAG,
     DropReason,
     Keyring,
-    Opener,
+    PacketCipher,
     PacketDropped,
     Rank,
-    Sealer,
     SessionNumbers,
     milliseconds,
 )
@@ -271,8 +270,8 @@ class SessionDoor:
         while not number:
             number = int.from_bytes(self._random(6), "big")
         given = self._random(TAG)
-        sealer = opener = None
+        cipher = None
         if self._keys is not None:
             down, up = self._keys.session(asked.rank, asked.nonce + given, number)
-            sealer, opener = Sealer(up), Opener(down)
-        return SessionClaim(SessionNumbers(self._model, number, sealer, opener), address, asked.nonce, given, stamp)
+            cipher = PacketCipher(up, down)
+        return SessionClaim(SessionNumbers(self._model, number, cipher), address, asked.nonce, given, stamp)

@@ -25,11 +25,10 @@ from interfaces.rsp.session import (
     TAG,
     DropReason,
     Keyring,
-    Opener,
+    PacketCipher,
     PacketDropped,
     PacketRoundTrip,
     Rank,
-    Sealer,
     SessionNumbers,
     milliseconds,
 )
@@ -402,11 +401,11 @@ class LocalCore:
             if self.opening.cookie != answer.given:
                 self.opening, self._next = self.opening._replace(cookie=answer.given), now
             return
-        sealer = opener = None
+        cipher = None
         if self._keys is not None:
             down, up = self._keys.session(self._rank, answer.nonce + answer.given, head.session)
-            sealer, opener = Sealer(down), Opener(up)
-        self.numbers = SessionNumbers(self.model.id, head.session, sealer, opener)
+            cipher = PacketCipher(down, up)
+        self.numbers = SessionNumbers(self.model.id, head.session, cipher)
         self.state, self._heard, self._next = LocalState.OPEN, now, now
         self.waiting_outputs.append(Began(head.session))
 

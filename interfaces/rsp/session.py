@@ -13,7 +13,7 @@ import hmac
 import struct
 from collections import deque
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from interfaces.rsp import header
 from interfaces.rsp.header import MODULUS, Header, PacketType, unwrapped, up_to
@@ -36,14 +36,6 @@ class Rank(enum.IntEnum):
     OPERATOR = 0
     ADMIN = 1
     """May take over by force."""
-
-
-class NotAuthenticError(Exception):
-    """A tag that isn't right; it never leaves a core."""
-
-
-class ReplayError(Exception):
-    """An authentic packet that came before; it never leaves a core."""
 
 
 def hkdf(secret: bytes, salt: bytes, info: bytes, length: int) -> bytes:
@@ -90,55 +82,45 @@ class Keyring:
         return keys[:32], keys[32:]
 
 
-def _cipher(key: bytes) -> Any:
-    from cryptography.hazmat.primitives.ciphers.aead import AESGCM
+class PacketCipher:
+    """Seals what one side sends in a session, and opens what the other side sent.
 
-    return AESGCM(key)
+    Whether a packet came before is looked at after its tag.
+    """
 
+    def __init__(self, sending: bytes, receiving: bytes) -> None:
+        """Take the keys of both directions."""
+        from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
-class Sealer:
-    """Seals what one side sends in a session."""
-
-    def __init__(self, key: bytes) -> None:
-        """Take the direction's key."""
-        self._cipher = _cipher(key)
+        self._sending, self._receiving = AESGCM(sending), AESGCM(receiving)
+        self._window = SequenceWindow(_WINDOW)
 
     def seal(self, head: bytes, body: bytes, counter: int) -> bytes:
         """The packet of a header, a body and its number without end."""
         count = _COUNTER.pack(counter)
-        sealed: bytes = self._cipher.encrypt(b"\0\0\0\0" + count, body, head)
-        return head + count + sealed
-
-
-class Opener:
-    """Opens what the other side sent; the window is looked at after the tag."""
-
-    def __init__(self, key: bytes) -> None:
-        """Take the direction's key."""
-        self._cipher = _cipher(key)
-        self._window = SequenceWindow(_WINDOW)
+        return head + count + self._sending.encrypt(b"\0\0\0\0" + count, body, head)
 
     def open(self, packet: bytes) -> tuple[bytes, int]:
         """The body of a sealed packet, and its counter.
 
         Raises:
-            NotAuthenticError: If a bit of it was changed, or another key sealed it.
-            ReplayError: If it came before, or so late that nobody knows.
+            PacketDropped: If a bit of it was changed, or another key sealed it; or if it came before, or so late
+                that nobody knows.
         """
         from cryptography.exceptions import InvalidTag
 
         if len(packet) < header.SIZE + OVERHEAD:
-            raise NotAuthenticError
+            raise PacketDropped(DropReason.AUTHENTICATION)
         count = packet[header.SIZE : header.SIZE + _COUNTER.size]
         try:
-            body: bytes = self._cipher.decrypt(
+            body = self._receiving.decrypt(
                 b"\0\0\0\0" + count, packet[header.SIZE + _COUNTER.size :], packet[: header.SIZE]
             )
         except InvalidTag:
-            raise NotAuthenticError from None
+            raise PacketDropped(DropReason.AUTHENTICATION) from None
         counter = int(_COUNTER.unpack(count)[0])
         if self._window.refusal(counter) is not None:
-            raise ReplayError
+            raise PacketDropped(DropReason.REPLAY)
         self._window.note(counter)
         return body, counter
 
@@ -186,13 +168,9 @@ def milliseconds(now: float) -> int:
 class SessionNumbers:
     """One side's numbers of a session, and its keys."""
 
-    def __init__(
-        self, model: int, session: int, sealer: Sealer | None = None, opener: Opener | None = None
-    ) -> None:
-        """Begin with number 0, sealed if there are a sealer and an opener."""
-        self.id = session
-        self.sealed = sealer is not None
-        self.model, self.sealer, self._opener = model, sealer, opener
+    def __init__(self, model: int, session: int, cipher: PacketCipher | None = None) -> None:
+        """Begin with number 0, sealed if there's a cipher."""
+        self.id, self.model, self.cipher = session, model, cipher
         self.number = 0
         """Of the next packet that goes out, without end."""
         self.newest = -1
@@ -211,7 +189,7 @@ class SessionNumbers:
         head = header.encode(
             Header(
                 self.model,
-                self.sealed,
+                self.cipher is not None,
                 kind,
                 number % MODULUS,
                 milliseconds(now),
@@ -220,7 +198,7 @@ class SessionNumbers:
                 buffers,
             )
         )
-        return head + body if self.sealer is None else self.sealer.seal(head, body, number)
+        return head + body if self.cipher is None else self.cipher.seal(head, body, number)
 
     def take(self, head: Header, data: bytes) -> tuple[bytes, int]:
         """The body of a packet that came, and its number, if it's newer than all before.
@@ -228,17 +206,12 @@ class SessionNumbers:
         It counts as received once `newest` is set to that number: not before its body was understood.
 
         Raises:
-            Dropped: If it isn't, or isn't authentic.
+            PacketDropped: If it isn't, or isn't authentic.
         """
-        if self._opener is None:
+        if self.cipher is None:
             number, body = unwrapped(head.number, self.newest), data[header.SIZE :]
         else:
-            try:
-                body, number = self._opener.open(data)
-            except NotAuthenticError:
-                raise PacketDropped(DropReason.AUTHENTICATION) from None
-            except ReplayError:
-                raise PacketDropped(DropReason.REPLAY) from None
+            body, number = self.cipher.open(data)
             if number % MODULUS != head.number:
                 raise PacketDropped(DropReason.MALFORMED)
         if number <= self.newest:

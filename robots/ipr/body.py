@@ -214,42 +214,32 @@ class Cargo:
     """Of its sides, in [0, 2]; the robot's top has 0.5, and PyBullet takes the product of both."""
 
 
-class CargoBody:
-    """A piece of cargo in a world: it meets the robot that it was put on, and the floor."""
+def put_cargo(world: World, cargo: Cargo, robot: int, floor: int, place: tuple[float, float, float, float]) -> int:
+    """Let a piece of cargo go just above a robot's top; it meets that robot and the floor.
 
-    def __init__(
-        self, world: World, cargo: Cargo, robot: int, floor: int, place: tuple[float, float, float, float]
-    ) -> None:
-        """Let it go just above the robot's top.
+    Args:
+        world: Where.
+        cargo: What.
+        robot: PyBullet's id of the robot.
+        floor: And of the floor.
+        place: Of its middle on the robot's top, x, y, z [m] and heading [rad], in the world.
 
-        Args:
-            world: Where.
-            cargo: What.
-            robot: PyBullet's id of the robot.
-            floor: And of the floor.
-            place: Of its middle on the robot's top, x, y, z [m] and heading [rad], in the world.
-        """
-        self.cargo = cargo
-        self._world = world
-        bullet, client = world.bullet, world.client
-        half = [cargo.length / 2, cargo.width / 2, cargo.height / 2]
-        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-        x, y, z, angle = (finite("place", value) for value in place)
-        turn = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
-        self.body = int(
-            bullet.createMultiBody(cargo.mass, shape, -1, [x, y, z + half[2] + _GAP], turn, physicsClientId=client)
-        )
-        """PyBullet's id."""
-        bullet.changeDynamics(self.body, -1, lateralFriction=cargo.friction, physicsClientId=client)
-        bullet.setCollisionFilterGroupMask(self.body, -1, 0, 0, physicsClientId=client)
-        for other in (robot, floor):
-            bullet.setCollisionFilterPair(self.body, other, -1, -1, 1, physicsClientId=client)
-
-    def pose(self) -> tuple[Array, Array]:
-        """Where its middle is [m], (3,), and how it's turned, (3, 3), in the world."""
-        bullet, client = self._world.bullet, self._world.client
-        position, turn = bullet.getBasePositionAndOrientation(self.body, physicsClientId=client)
-        return np.array(position), np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
+    Returns:
+        PyBullet's id of the cargo.
+    """
+    bullet, client = world.bullet, world.client
+    half = [cargo.length / 2, cargo.width / 2, cargo.height / 2]
+    shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+    x, y, z, angle = (finite("place", value) for value in place)
+    turn = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
+    body = int(
+        bullet.createMultiBody(cargo.mass, shape, -1, [x, y, z + half[2] + _GAP], turn, physicsClientId=client)
+    )
+    bullet.changeDynamics(body, -1, lateralFriction=cargo.friction, physicsClientId=client)
+    bullet.setCollisionFilterGroupMask(body, -1, 0, 0, physicsClientId=client)
+    for other in (robot, floor):
+        bullet.setCollisionFilterPair(body, other, -1, -1, 1, physicsClientId=client)
+    return body
 
 
 _HOLD_TIME = 0.03
@@ -290,7 +280,7 @@ class MobileBody(MobileRobot):
             numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1, physicsClientId=self.world.client
         )
         self._room_bodies = RoomBodies(self.world, self.room)
-        self._cargo: list[CargoBody] = []
+        self._cargo: list[int] = []
         train, dt = self._train, self.reality.dt
         start = self._truth
         self.body_id, self._centre, self._R_CR = load_chassis(
@@ -356,13 +346,15 @@ class MobileBody(MobileRobot):
         at, R = self._pose()
         top = at + R @ np.array([x, y, chassis.height])
         there = float(top[0]), float(top[1]), float(top[2]), self._truth[2]
-        self._cargo.append(CargoBody(self.world, cargo, self.body_id, self._room_bodies.floor, there))
+        self._cargo.append(put_cargo(self.world, cargo, self.body_id, self._room_bodies.floor, there))
 
     @property
     def cargo(self) -> tuple[tuple[float, float, float], ...]:
         """Where the middle of each thing that was put on top is now, in the robot's frame, x, y, z [m]."""
         at, R = self._pose()
-        places = (R.T @ (one.pose()[0] - at) for one in self._cargo)
+        bullet, client = self.world.bullet, self.world.client
+        found = (bullet.getBasePositionAndOrientation(one, physicsClientId=client)[0] for one in self._cargo)
+        places = (R.T @ (np.array(place) - at) for place in found)
         return tuple((float(x), float(y), float(z)) for x, y, z in places)
 
     @property

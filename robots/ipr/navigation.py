@@ -11,9 +11,8 @@ from robots.bullet.rooms import Room
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.journey import JourneyConfig
 from robots.onboard.movers import MoversConfig, YieldingConfig
-from robots.onboard.navigator import CELL, Navigator, NavigatorConfig
+from robots.onboard.navigator import CELL, Navigator
 from robots.onboard.routes import RouteConfig, RouteMap
 from vrs.mobile import Grid
 from vrs.model import Array
@@ -60,53 +59,28 @@ def _corners(x: float, y: float, angle: float, length: float, width: float) -> A
     return np.asarray(half @ np.array([[c, s], [-s, c]]) + (x, y))
 
 
-def navigator_config(body: MobileRobot, period: float, journey: JourneyConfig | None = None) -> NavigatorConfig:
-    """How a robot goes.
-
-    Args:
-        body: With sonars.
-        period: Between two drives [s].
-        journey: How long it tries; as usual unless given.
-    """
-    outline, (near, far) = outline_of(body.chassis.footprint), body.chassis.sonar_reach
-    mounts = mounts_of(body)
-    sonar = body.senses.sonar
-    half_cone = 0.0 if sonar is None else sonar.half_angle
-    avoidance = AvoidanceConfig(
-        outline, mounts, half_cone=half_cone, range_min=near, range_max=far, clearance=CLEARANCE, period=period
-    )
-    return NavigatorConfig(
-        avoidance,
-        MoversConfig(mounts, half_cone=half_cone),
-        YieldingConfig(outline),
-        journey=JourneyConfig() if journey is None else journey,
-    )
-
-
 class BodyNavigator:
     """A navigator on a robot's own odometry, laser and sonars."""
 
-    def __init__(
-        self,
-        body: MobileRobot,
-        period: float,
-        *,
-        roads: RouteMap | None = None,
-        journey: JourneyConfig | None = None,
-    ) -> None:
+    def __init__(self, body: MobileRobot, period: float) -> None:
         """Take a robot with a laser scanner and sonars.
 
         Args:
             body: The robot.
             period: Between two drives [s].
-            roads: The known ways; those of its room's plan unless given.
-            journey: How long it tries; as usual unless given.
         """
         room = body.room
         shape = math.ceil(room.length / CELL - 1e-9), math.ceil(room.width / CELL - 1e-9)
-        ways = route_map(room, body.chassis.footprint) if roads is None else roads
+        ways = route_map(room, body.chassis.footprint)
+        outline, (near, far) = outline_of(body.chassis.footprint), body.chassis.sonar_reach
+        mounts, sonar = mounts_of(body), body.senses.sonar
+        half_cone = 0.0 if sonar is None else sonar.half_angle
+        avoidance = AvoidanceConfig(
+            outline, mounts, half_cone=half_cone, range_min=near, range_max=far, clearance=CLEARANCE, period=period
+        )
+        movers = MoversConfig(mounts, half_cone=half_cone)
         self._body = body
-        self.navigator = Navigator(ways, Grid(shape, CELL), navigator_config(body, period, journey))
+        self.navigator = Navigator(ways, Grid(shape, CELL), avoidance, movers, YieldingConfig(outline))
         """What decides."""
 
     def drive(self, posture: Posture, *, v_before: float) -> Drive:

@@ -4,9 +4,6 @@ from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline
 from robots.onboard.command_filter import (
     CommandFilter,
     CommandFilterConfig,
-    FilterEvent,
-    FilterEventKind,
-    FilterOutput,
 )
 from robots.onboard.curve import Curve, CurveKind, CurvePoint, load_curve, read_curve
 from robots.onboard.curve_trackers import (
@@ -20,7 +17,7 @@ from robots.onboard.curve_trackers import (
 )
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.following import FollowingAbort, SensorFault, SensorMonitor, too_far
-from robots.onboard.global_localization import Answer, Candidate, Found, SearchConfig, Surroundings, locate
+from robots.onboard.global_localization import Candidate, SearchConfig, Surroundings, locate
 from robots.onboard.gsp_map import GspMap, Lines, load_map, read_map, save_map
 from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
 from robots.onboard.laser import (
@@ -35,13 +32,13 @@ from robots.onboard.laser import (
 from robots.onboard.lease import Ended, Grant, Lease, LeaseConfig, LeaseEnd, LeaseRefusal, LeaseState, Pending
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import LineFilter, MatchingConfig, MotionConfig
-from robots.onboard.localization import LocalizationConfig, Observability, PaperConfig, PaperLocalizer, Tracker
+from robots.onboard.localization import LocalizationConfig, Observability, PaperLocalizer, Tracker
 from robots.onboard.localizer import Event, Localizer, LocalizerConfig, Status
 from robots.onboard.map_building import BuildingConfig, MapBuilder, Surveyor
 from robots.onboard.movers import Mover, MoversConfig, MoverTracker, Yielding, YieldingConfig
-from robots.onboard.navigator import Navigator, NavigatorConfig
+from robots.onboard.navigator import Navigator
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
-from robots.onboard.path import Arc, MovingPath, PathGenerator, PathGeneratorConfig, Pivot, Projection
+from robots.onboard.path import Arc, MovingPath, PathGenerator, Pivot, Projection
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap, RouteProblem
 from robots.onboard.servo import FeedForward, Servo, ServoGains, StopMotion, from_commanded, from_measured
@@ -64,7 +61,6 @@ from robots.onboard.watchdog import (
 
 __all__ = [
     "AcceptedFuture",
-    "Answer",
     "Arc",
     "AvoidanceConfig",
     "Backwards",
@@ -84,11 +80,7 @@ __all__ = [
     "ExtractionConfig",
     "FeedForward",
     "FieldLaw",
-    "FilterEvent",
-    "FilterEventKind",
-    "FilterOutput",
     "FollowingAbort",
-    "Found",
     "FrameReader",
     "GoOn",
     "Goal",
@@ -121,7 +113,6 @@ __all__ = [
     "MoversConfig",
     "MovingPath",
     "Navigator",
-    "NavigatorConfig",
     "NoRoute",
     "Observability",
     "ObstacleAvoidance",
@@ -129,12 +120,10 @@ __all__ = [
     "ObstacleMapConfig",
     "OdometryTrack",
     "Outline",
-    "PaperConfig",
     "PaperLocalizer",
     "PathFollowingConfig",
     "PathFollowingController",
     "PathGenerator",
-    "PathGeneratorConfig",
     "Pending",
     "Pivot",
     "Posture",

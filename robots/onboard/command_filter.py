@@ -10,12 +10,10 @@ model's Select, which prefers the queue, the component that arrivals go to.
 
 from __future__ import annotations
 
-import enum
 import math
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Generic, NamedTuple, TypeVar
+from typing import Annotated, Generic, TypeVar
 
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
@@ -34,57 +32,17 @@ class CommandFilterConfig:
     """Most commands in the filter, in [1, 10⁷]: queued, in the generator, or given out and not yet fetched."""
 
 
-class FilterOutput(NamedTuple, Generic[Command]):
-    """A command that the filter gives out."""
-
-    t: float
-    """When [s]; not later than when it's fetched."""
-    command: Command
-
-
-class FilterEventKind(enum.StrEnum):
-    """What can happen in a filter."""
-
-    RECEIVED = "received"
-    """`Filter.U_in`: a command came."""
-    PASSED = "passed"
-    """`Queue.U_out`: the queue passed a command to the generator."""
-    GENERATED = "generated"
-    """`Generator.U_out`: the generator gave it out, and told the queue that it's done."""
-
-
-class FilterEvent(NamedTuple):
-    """Something that happened in a filter."""
-
-    t: float
-    """When [s]."""
-    kind: FilterEventKind
-    number: int
-    """Of the command, in the order in which they came, from 0."""
-    waiting: int
-    """n, the length of the queue afterwards."""
-
-
 class CommandFilter(Generic[Command]):
     """A queue and a generator. It knows no clock; whoever drives it calls `advance` at `next_deadline`."""
 
-    def __init__(
-        self, config: CommandFilterConfig | None = None, *, observe: Callable[[FilterEvent], None] | None = None
-    ) -> None:
-        """Start empty.
-
-        Args:
-            config: How it works.
-            observe: Is told of every event.
-        """
+    def __init__(self, config: CommandFilterConfig | None = None) -> None:
+        """Start empty."""
         self._config = CommandFilterConfig() if config is None else config
-        self._observe = observe
         self._queue: deque[Command] = deque()
-        self._outputs: list[FilterOutput[Command]] = []
+        self._outputs: list[tuple[float, Command]] = []
         self._busy: list[Command] = []
         self._due = math.inf
         self._now = -math.inf
-        self._counts = dict.fromkeys(FilterEventKind, 0)
         self.refused = 0
         """Commands that came when the filter was full. Each leaves a hole in what the robot drives."""
 
@@ -116,16 +74,15 @@ class CommandFilter(Generic[Command]):
             self.refused += 1
             return False
         self._queue.append(command)
-        self._tell(now, FilterEventKind.RECEIVED)
         if not self._busy:
             self._pass(now)
         return True
 
-    def advance(self, *, now: float) -> list[FilterOutput[Command]]:
+    def advance(self, *, now: float) -> list[tuple[float, Command]]:
         """Do what is due by now [s].
 
         Returns:
-            What was given out since the last call, in order, each with its own time.
+            What was given out since the last call, in order: when [s], and the command.
 
         Raises:
             InvalidValueError: If the time runs backwards or isn't finite.
@@ -137,7 +94,7 @@ class CommandFilter(Generic[Command]):
     def next_deadline(self) -> float | None:
         """When the next command is given out [s]; None while the filter is empty."""
         if self._outputs:
-            return self._outputs[0].t
+            return self._outputs[0][0]
         return self._due if self._busy else None
 
     def _time(self, now: float) -> float:
@@ -150,18 +107,10 @@ class CommandFilter(Generic[Command]):
     def _run(self, now: float, *, inclusive: bool) -> None:
         while self._due < now or (inclusive and self._due == now):
             t, self._due = self._due, math.inf
-            self._outputs.append(FilterOutput(t, self._busy.pop()))
-            self._tell(t, FilterEventKind.GENERATED)
+            self._outputs.append((t, self._busy.pop()))
             if self._queue:
                 self._pass(t)
 
     def _pass(self, t: float) -> None:
         self._busy.append(self._queue.popleft())
         self._due = t + self._config.interval
-        self._tell(t, FilterEventKind.PASSED)
-
-    def _tell(self, t: float, kind: FilterEventKind) -> None:
-        number = self._counts[kind]
-        self._counts[kind] = number + 1
-        if self._observe is not None:
-            self._observe(FilterEvent(t, kind, number, len(self._queue)))

@@ -9,7 +9,6 @@ with all of them.
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -22,16 +21,6 @@ from vrs.checks import validated, within
 from vrs.mobile import wrapped
 from vrs.mobile.model import all_wrapped
 from vrs.model import Array, frozen_array
-
-
-class Answer(enum.StrEnum):
-    """What is said of where a robot is."""
-
-    UNIQUE = "unique"
-    AMBIGUOUS = "ambiguous"
-    """It may be at several places."""
-    NOWHERE = "nowhere"
-    """No place of the map fits what it sees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,46 +98,40 @@ class Candidate:
     """Mean logarithm of the likelihood of a beam."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """The answer."""
-
-    answer: Answer
-    candidates: tuple[Candidate, ...]
-    """The best first; one if unique, two or more if ambiguous."""
-
-
-def locate(known: GspMap, around: Surroundings, config: SearchConfig | None = None) -> Found:
+def locate(known: GspMap, around: Surroundings, config: SearchConfig | None = None) -> tuple[Candidate, ...]:
     """Look for the places of a map where a robot may be.
 
     Args:
         known: The map.
         around: What it saw.
         config: How places are looked for.
+
+    Returns:
+        The best first: none where nothing fits, one if that's the place, more if it may be any of them.
     """
     config = SearchConfig() if config is None else config
     beams = _spread(around, config.beams)
     rough = _spread(around, max(20, config.beams // 4))
     places = _voted(guesses(known.lines, around.lines, config), config)
     if not len(places):
-        return Found(Answer.NOWHERE, ())
+        return ()
     scores = [_judged(known, rough, tuple(place.tolist()))[1] for place in places]
     best = np.argsort(scores)[::-1][: config.refined]
     candidates = [_refined(known, around, beams, tuple(places[k].tolist()), config) for k in best]
     return decided(candidates, config)
 
 
-def decided(candidates: list[Candidate], config: SearchConfig) -> Found:
+def decided(candidates: list[Candidate], config: SearchConfig) -> tuple[Candidate, ...]:
     """Choose among candidates: the best, if it fits, and those elsewhere that are not much less likely."""
     ordered = sorted(candidates, key=lambda one: -one.score)
     if not ordered or not _fits(ordered[0].evidence, config):
-        return Found(Answer.NOWHERE, ())
+        return ()
     chosen: list[Candidate] = []
     least = ordered[0].score - math.log(config.odds) / config.worth
     for one in ordered:
         if one.score >= least and all(_elsewhere(one, other, config) for other in chosen):
             chosen.append(one)
-    return Found(Answer.UNIQUE if len(chosen) == 1 else Answer.AMBIGUOUS, tuple(chosen))
+    return tuple(chosen)
 
 
 def _fits(found: Evidence, config: SearchConfig) -> bool:

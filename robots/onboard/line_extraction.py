@@ -82,23 +82,17 @@ class Fit(NamedTuple):
     """Sum of the squares of what they're off, in deviations."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Extraction:
-    """What was found in a scan."""
-
-    lines: Lines
-    """In the frame of the points."""
-    noise: float
-    """Standard deviation of the ranges, as these lines show it [m]; nan if there are none."""
-
-
-def extract(points: Points, config: ExtractionConfig, noise: float | None = None) -> Extraction:
+def extract(points: Points, config: ExtractionConfig, noise: float | None = None) -> tuple[Lines, float]:
     """Find the lines in a scan.
 
     Args:
         points: Of the scan, in the order of its beams.
         config: What counts as a line.
         noise: Standard deviation of the ranges [m]; the config's unless given.
+
+    Returns:
+        The lines, in the frame of the points; and the standard deviation of the ranges, as these lines show it [m],
+        nan if there are none.
     """
     sigma = config.noise if noise is None else noise
     fits: list[Fit] = []
@@ -106,10 +100,10 @@ def extract(points: Points, config: ExtractionConfig, noise: float | None = None
         fits += _pieces(points, first, last, config, sigma)
     free = sum(fit.points - 2 for fit in fits)
     if not fits or free <= 0:
-        return Extraction(Lines.none(), math.nan)
+        return Lines.none(), math.nan
     rows = np.array(fits)
     lines = Lines.of(rows[:, :3], rows[:, 3:5], rows[:, 5:7], rows[:, 7])
-    return Extraction(lines, sigma * math.sqrt(float(rows[:, 8].sum()) / free))
+    return lines, sigma * math.sqrt(float(rows[:, 8].sum()) / free)
 
 
 def _clusters(points: Points, config: ExtractionConfig, sigma: float) -> list[tuple[int, int]]:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from robots.onboard.gsp_map import GspMap, Lines, injection
 from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
-from robots.onboard.line_extraction import Extraction, ExtractionConfig, extract
+from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
 from vrs.checks import validated, within
 from vrs.mobile import advanced, wrapped
@@ -132,10 +132,8 @@ class Tracker:
         """Of the ranges, as the scans show it [m]."""
         self.sights: Sights | None = None
         """What was recognised in the last scan."""
-        self.extraction: Extraction | None = None
-        """What lines it had."""
         self.seen = Lines.none()
-        """The same lines, in the robot's frame, with all of their doubt."""
+        """All lines of the last scan, in the robot's frame, with all of their doubt."""
         self.points: Points | None = None
         """What it saw, in the robot's frame when it was taken in."""
         self.seen_from = posture
@@ -180,17 +178,17 @@ class Tracker:
             return False
         self._scanned = scan.time
         self.points = points = deskewed(scan, self.odometry)
-        self.extraction = found = extract(points, self._config.extraction, self.noise)
-        if math.isfinite(found.noise):
-            self.noise += 0.1 * (min(max(found.noise, 1e-3), 0.1) - self.noise)
-        self._take(found)
+        lines, noise = extract(points, self._config.extraction, self.noise)
+        if math.isfinite(noise):
+            self.noise += 0.1 * (min(max(noise, 1e-3), 0.1) - self.noise)
+        self._take(lines)
         return True
 
-    def _take(self, found: Extraction) -> None:
+    def _take(self, lines: Lines) -> None:
         config = self._config
         alike = self._alike(self.filter.posture)
         floors = alike * np.array([config.across_floor**2, config.turn_floor**2])
-        seen = self.seen = replace(found.lines, variances=frozen_array(found.lines.variances + floors))
+        seen = self.seen = replace(lines, variances=frozen_array(lines.variances + floors))
         turned = (_BENT * self.odometry.bend) ** 2
         sights = matched(self.filter, seen, config.matching, turned)
         if len(seen) > len(sights.of):
@@ -252,19 +250,12 @@ def step_between(before: tuple[float, float, float], after: tuple[float, float, 
     return (dx * math.cos(middle) + dy * math.sin(middle)) / sinc(0.5 * turn), turn
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class PaperConfig:
-    """What the paper leaves open."""
-
-    turn: Annotated[float, within(0.01, 1.5)] = 0.3
-    """Lines correspond if they differ by no more [rad], in [0.01, 1.5]."""
-    across: Annotated[float, within(0.01, 10.0)] = 0.3
-    """Nor by more across [m], in [0.01, 10]."""
-    rounds: Annotated[int, within(1, 1000)] = 20
-    """Of eq. (9), at most, in [1, 1000]."""
-    enough: Annotated[float, within(0.0, 1.0)] = 1e-4
-    """A round that changes less ends it [m, rad], in [0, 1]."""
+_TURN, _ACROSS = 0.3, 0.3
+"""The paper's lines correspond if they differ by no more [rad], [m]; it leaves this open, and what follows."""
+_ROUNDS = 20
+"""Of eq. (9), at most."""
+_ENOUGH = 1e-4
+"""A round that changes less ends it [m, rad]."""
 
 
 def differences(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array:
@@ -296,13 +287,13 @@ def injected_update(known: Lines, placed: Lines, of: NDArray[np.int64]) -> Array
     return np.asarray(np.einsum("k,kij,kj->i", weights(known, placed, of), R, differences(known, placed, of)))
 
 
-def nearest_lines(known: Lines, placed: Lines, config: PaperConfig) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def nearest_lines(known: Lines, placed: Lines) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Seen lines, in the world frame, and the nearest lines of the map that they may be."""
     turn = all_wrapped(placed.poses[:, None, 2] - known.poses[:, 2])
     delta = placed.poses[:, None, :2] - known.poses[:, :2]
     along, off = np.sum(delta * known.directions, axis=-1), np.abs(np.sum(delta * known.normals, axis=-1))
     beside = (along >= known.spans[:, 0]) & (along <= known.spans[:, 1])
-    cost = np.where((np.abs(turn) < config.turn) & (off < config.across) & beside, off, np.inf)
+    cost = np.where((np.abs(turn) < _TURN) & (off < _ACROSS) & beside, off, np.inf)
     if not cost.size:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     of = cost.argmin(axis=1)
@@ -313,19 +304,12 @@ def nearest_lines(known: Lines, placed: Lines, config: PaperConfig) -> tuple[NDA
 class PaperLocalizer:
     """Dead reckoning, corrected by the paper's update after each scan."""
 
-    def __init__(
-        self,
-        known: GspMap,
-        posture: tuple[float, float, float],
-        config: PaperConfig | None = None,
-        extraction: ExtractionConfig | None = None,
-    ) -> None:
+    def __init__(self, known: GspMap, posture: tuple[float, float, float]) -> None:
         """Begin at a posture (x, y, θ) [m, m, rad] in a map."""
         self._known = known.lines
         self.posture = posture
         """Where the robot is taken to be, (x, y, θ) [m, m, rad]."""
-        self._config = PaperConfig() if config is None else config
-        self._extraction = ExtractionConfig() if extraction is None else extraction
+        self._extraction = ExtractionConfig()
         self.odometry = OdometryTrack()
         self._scanned = -math.inf
 
@@ -344,15 +328,15 @@ class PaperLocalizer:
         if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
             return False
         self._scanned = scan.time
-        seen = extract(deskewed(scan, self.odometry), self._extraction).lines
-        for _ in range(self._config.rounds):
+        seen, _ = extract(deskewed(scan, self.odometry), self._extraction)
+        for _ in range(_ROUNDS):
             placed = seen.moved(self.posture)
-            mine, of = nearest_lines(self._known, placed, self._config)
+            mine, of = nearest_lines(self._known, placed)
             if not len(mine):
                 break
             step = injected_update(self._known, placed.taken(mine), of)
             x, y, theta = self.posture
             self.posture = x + float(step[0]), y + float(step[1]), theta + float(step[2])
-            if np.abs(step).max() < self._config.enough:
+            if np.abs(step).max() < _ENOUGH:
                 break
         return True

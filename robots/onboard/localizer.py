@@ -18,7 +18,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from robots.onboard.global_localization import Answer, Candidate, SearchConfig, locate
+from robots.onboard.global_localization import Candidate, SearchConfig, locate
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.laser import LaserScan, OdometryTrack
 from robots.onboard.line_filter import evidence
@@ -111,7 +111,8 @@ class Localizer:
         self._known = known
         self._config = config = LocalizerConfig() if config is None else config
         self.odometry = OdometryTrack()
-        self._tracker: Tracker | None = None
+        self.tracker: Tracker | None = None
+        """What follows the robot; None before it was ever known where that is."""
         self._surveyor: Surveyor | None = None
         self._verdicts: deque[tuple[float, bool, bool]] = deque()
         self._looked = self._since = self._scanned = -math.inf
@@ -126,24 +127,19 @@ class Localizer:
         else:
             place, turn = config.place_doubt**2, config.turn_doubt**2
             doubt = np.diag([place, place, turn]) if covariance is None else covariance
-            self._tracker = Tracker(known, posture, doubt, config.localization)
+            self.tracker = Tracker(known, posture, doubt, config.localization)
             self.status = Status.TRACKING
-
-    @property
-    def tracker(self) -> Tracker | None:
-        """What follows the robot; None before it was ever known where that is."""
-        return self._tracker
 
     @property
     def posture(self) -> tuple[float, float, float] | None:
         """Where the robot is, (x, y, θ) [m, m, rad]; by dead reckoning while it searches; None if never known."""
-        return None if self._tracker is None else self._tracker.posture
+        return None if self.tracker is None else self.tracker.posture
 
     @property
     def covariance(self) -> Array:
         """Of the posture, (3, 3); huge while it searches."""
-        tracking = self.status is Status.TRACKING and self._tracker is not None
-        return self._tracker.covariance if tracking and self._tracker is not None else UNKNOWN
+        tracking = self.status is Status.TRACKING and self.tracker is not None
+        return self.tracker.covariance if tracking and self.tracker is not None else UNKNOWN
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -163,7 +159,7 @@ class Localizer:
         self.odometry.add(time, reading)
         if self._since == -math.inf:
             self._since = time
-        for part in (self._tracker, self._surveyor):
+        for part in (self.tracker, self._surveyor):
             if part is not None:
                 part.move(time, reading)
 
@@ -172,7 +168,7 @@ class Localizer:
         if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
             return False
         self._scanned = scan.time
-        tracker, surveyor = self._tracker, self._surveyor
+        tracker, surveyor = self.tracker, self._surveyor
         if tracker is not None:
             tracker.see(scan)
         if surveyor is not None:
@@ -197,7 +193,7 @@ class Localizer:
 
     def _found(self, tracker: Tracker) -> None:
         """Track on."""
-        self._tracker, self._surveyor = tracker, None
+        self.tracker, self._surveyor = tracker, None
         self._verdicts.clear()
         self._becomes(Status.TRACKING)
 
@@ -236,15 +232,13 @@ class Localizer:
         if not enough and now < self._since + config.patience:
             return
         self._looked = now
-        found = locate(self._known, surveyor.surroundings(), config.search)
-        self._candidates = found.candidates
-        if found.answer is Answer.UNIQUE:
-            if self._confirmed(found.candidates[0], surveyor):
-                self._go_on(found.candidates[0], surveyor)
-            else:
-                self._surveyor = Surveyor()
+        places = self._candidates = locate(self._known, surveyor.surroundings(), config.search)
+        if len(places) != 1:
+            self._becomes(Status.AMBIGUOUS if places else Status.SEARCHING)
+        elif self._confirmed(places[0], surveyor):
+            self._go_on(places[0], surveyor)
         else:
-            self._becomes(Status.AMBIGUOUS if found.answer is Answer.AMBIGUOUS else Status.SEARCHING)
+            self._surveyor = Surveyor()
 
     def _confirmed(self, place: Candidate, surveyor: Surveyor) -> bool:
         """Whether the last scan fits there, too: a robot that was held has lost itself in its own frame."""
@@ -258,7 +252,7 @@ class Localizer:
         """Track from a place on."""
         posture = composed(place.posture, surveyor.posture)
         doubt = compounded(place.posture, place.covariance, surveyor.posture, surveyor.covariance)
-        self._tracker = tracker = Tracker(self._known, posture, doubt, self._config.localization)
+        self.tracker = tracker = Tracker(self._known, posture, doubt, self._config.localization)
         newest = self.odometry.newest
         assert newest is not None
         tracker.move(self.odometry.time, newest)

@@ -103,7 +103,6 @@ class MapBuilder(Tracker):
     def _grow(self) -> None:
         """Stretch what was recognised, and take in what is new and has lasted."""
         assert self.sights is not None
-        assert self.extraction is not None
         self.filter.stretch(self.sights)
         fresh = self._fresh(self.seen, self.sights)
         placed = fresh.moved(self.posture)

@@ -10,14 +10,13 @@ has explained keeps the robot from backing or turning into it, and doesn't block
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
+from robots.onboard.journey import Goal, Journey, JourneyState
 from robots.onboard.laser import LaserScan, OdometryTrack
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
@@ -42,48 +41,41 @@ _AROUND = 4.0
 """Known things further away don't matter to a drive [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class NavigatorConfig:
-    """How it goes."""
-
-    avoidance: AvoidanceConfig
-    """Of what keeps it off what stands; its clearance is smaller than the margins of the routes."""
-    movers: MoversConfig
-    """Of what follows who walks."""
-    yielding: YieldingConfig
-    """Of what goes out of their way."""
-    obstacles: ObstacleMapConfig = field(default_factory=ObstacleMapConfig)
-    """Of what remembers what stands."""
-    journey: JourneyConfig = field(default_factory=JourneyConfig)
-    """Of routes and goals."""
-
-
 class Navigator:
     """Goals in, drives out; it knows no clock. Odometry, scans and echoes come as they're there."""
 
-    def __init__(self, roads: RouteMap, grid: Grid, config: NavigatorConfig) -> None:
+    def __init__(
+        self,
+        roads: RouteMap,
+        grid: Grid,
+        avoidance: AvoidanceConfig,
+        movers: MoversConfig,
+        yielding: YieldingConfig,
+    ) -> None:
         """Stand.
 
         Args:
             roads: The known ways.
             grid: Cells over the building.
-            config: How to go.
+            avoidance: Of what keeps it off what stands; its clearance is smaller than the margins of the routes.
+            movers: Of what follows who walks.
+            yielding: Of what goes out of their way.
         """
-        self._config = config
-        tolerance = config.obstacles.tolerance
-        self.obstacles = ObstacleMap(grid, lambda places: roads.knows(places, tolerance), config.obstacles)
+        self._mounts, self._half_cone, self._range_max = avoidance.mounts, avoidance.half_cone, avoidance.range_max
+        tolerance = ObstacleMapConfig().tolerance
+        self.obstacles = ObstacleMap(grid, lambda places: roads.knows(places, tolerance))
         """What stands there beside the map."""
-        self.avoidance = ObstacleAvoidance(config.avoidance)
-        self.movers = MoverTracker(config.movers)
+        self.avoidance = ObstacleAvoidance(avoidance)
+        self.movers = MoverTracker(movers)
         """Who walks."""
-        self.yielding = Yielding(config.yielding, self.avoidance)
-        self.journey = Journey(roads, self._standing, config.journey, room=self._room)
+        self.yielding = Yielding(yielding, self.avoidance)
+        self.journey = Journey(roads, self._standing, room=self._room)
         """Its goal, its route, how far it is."""
         self._known = roads.outlines(_SPACING)
         self._odometry = OdometryTrack()
         self._now = -math.inf
         self._seen = self._heard = -math.inf
-        angles = np.array([mount.angle for mount in config.avoidance.mounts])
+        angles = np.array([mount.angle for mount in avoidance.mounts])
         self._astern = np.abs(all_wrapped(angles)) > _ASTERN
 
     def go(self, goal: Goal, posture: Posture, *, now: float) -> JourneyState:
@@ -160,7 +152,7 @@ class Navigator:
         x, y, theta = posture
         c, s = math.cos(theta), math.sin(theta)
         for k in np.flatnonzero(found).tolist():
-            mount, half = self._config.avoidance.mounts[k], self._config.avoidance.half_cone
+            mount, half = self._mounts[k], self._half_cone
             bearing = theta + mount.angle + np.linspace(-half, half, 5)
             at = x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y
             arc = at + (ranges[k] + _INSIDE) * np.column_stack([np.cos(bearing), np.sin(bearing)])
@@ -169,15 +161,15 @@ class Navigator:
 
     def _is_explained(self, ranges: Array, posture: Posture) -> NDArray[np.bool_]:
         """Which echoes come from where something is known to be."""
-        config, places = self._config.avoidance, self._around(posture)
+        places = self._around(posture)
         found = np.zeros(len(ranges), bool)
         x, y, theta = posture
         c, s = math.cos(theta), math.sin(theta)
-        for k in np.flatnonzero(ranges < config.range_max).tolist():
-            mount = config.mounts[k]
+        for k in np.flatnonzero(ranges < self._range_max).tolist():
+            mount = self._mounts[k]
             dx, dy = (places - (x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y)).T
             far = np.hypot(dx, dy)
             aside = np.abs(all_wrapped(np.arctan2(dy, dx) - theta - mount.angle))
             near = np.abs(far - ranges[k]) < _EXPLAINED
-            found[k] = bool((near & (aside < config.half_cone + 0.05)).any())
+            found[k] = bool((near & (aside < self._half_cone + 0.05)).any())
         return found

@@ -16,15 +16,17 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from robots.onboard.driving import Posture
-from vrs.checks import finite, number_in, validated, within
+from vrs.checks import finite, number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 
 _STRAIGHT = 1e-12
 """An arc of less curvature is a line [1/m]."""
+_PIVOT_RADIUS = 1e-3
+"""Arcs of a smaller radius [m] are driven as turns on the spot; their ends stay exact."""
 _EQUAL = 1e-13
 """Curvatures nearer than this [1/m], relatively from 1 on, are one."""
 
@@ -137,8 +139,10 @@ class MovingPath:
             raise InvalidValueError("capacity", capacity, "a positive integer")
         self._capacity = capacity
         self._pieces: deque[_Piece] = deque()
-        self._end = Posture(*(finite("start", value) for value in start))
-        self._s = 0.0
+        self.end = Posture(*(finite("start", value) for value in start))
+        """The robot's posture at the end of the path."""
+        self.length = 0.0
+        """Way from the path's beginning to its end, with what is forgotten [m]."""
         self._stops: deque[float] = deque()
         self._at = 0.0
         self._theta: float | None = None
@@ -147,16 +151,6 @@ class MovingPath:
     def __len__(self) -> int:
         """How many pieces are kept."""
         return len(self._pieces)
-
-    @property
-    def end(self) -> Posture:
-        """The robot's posture at the end of the path."""
-        return self._end
-
-    @property
-    def length(self) -> float:
-        """Way from the path's beginning to its end, with what is forgotten [m]."""
-        return self._s
 
     def append(self, piece: PathPiece, *, end: Posture | None = None) -> bool:
         """Add a piece at the end.
@@ -174,17 +168,17 @@ class MovingPath:
         elif len(self._pieces) >= self._capacity:
             return False
         else:
-            added = _Piece(piece, self._end, self._s, last.direction if last is not None else 1)
+            added = _Piece(piece, self.end, self.length, last.direction if last is not None else 1)
             if last is not None and not last.pivots and (added.pivots or added.direction != last.direction):
-                self._stops.append(self._s)
+                self._stops.append(self.length)
             self._pieces.append(added)
             last = added
         if isinstance(piece, Arc):
-            self._s += piece.length
+            self.length += piece.length
         if end is None:
             turned = last.start._replace(theta=last.start.theta + last.amount)
             end = turned if last.pivots else last.at(last.amount)
-        last.end = self._end = end
+        last.end = self.end = end
         return True
 
     def locate(self, posture: tuple[float, float, float]) -> Projection:
@@ -199,7 +193,7 @@ class MovingPath:
         x, y, theta = posture
         pieces = self._pieces
         if not pieces:
-            return self._beside(x, y, self._end, 0.0, 0.0, 1, None)
+            return self._beside(x, y, self.end, 0.0, 0.0, 1, None)
         piece = pieces[0]
         while not piece.pivots:
             self._at = _nearest(piece, self._at, x, y)
@@ -264,7 +258,7 @@ class MovingPath:
     ) -> Projection:
         theta_d = place.theta if direction > 0 else place.theta + math.pi
         lateral = (y - place.y) * math.cos(theta_d) - (x - place.x) * math.sin(theta_d)
-        left = self._s - s
+        left = self.length - s
         to_stop = 0.0 if turn is not None else (self._stops[0] - s if self._stops else left)
         return Projection(s, place.x, place.y, theta_d, lateral, curvature, direction, left, to_stop, turn)
 
@@ -283,38 +277,22 @@ def _nearest(piece: _Piece, at: float, x: float, y: float) -> float:
     return min(at + max(way, 0.0), piece.amount)
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class PathGeneratorConfig:
-    """How commands become pieces of a path."""
-
-    period: Annotated[float, within(1e-4, 60.0, "s")] = 0.1
-    """T, how long each command was driven by the virtual robot [s], in [1e-4, 60]."""
-    pivot_radius: Annotated[float, within(0.0, 0.1, "m")] = 1e-3
-    """Arcs of a smaller radius [m] are driven as turns on the spot, in [0, 0.1]; their ends stay exact."""
-
-
 class PathGenerator:
     """Adds to a path what each command adds to the virtual robot's."""
 
-    def __init__(self, path: MovingPath, config: PathGeneratorConfig | None = None) -> None:
+    def __init__(self, path: MovingPath) -> None:
         """Take the path; the virtual robot is at its end."""
         self._path = path
-        self._config = PathGeneratorConfig() if config is None else config
-        self._posture = path.end
-
-    @property
-    def posture(self) -> Posture:
+        self.posture = path.end
         """Where the virtual robot is after the last command."""
-        return self._posture
 
-    def receive(self, v: float, w: float, *, duration: float | None = None) -> bool:
+    def receive(self, v: float, w: float, *, duration: float) -> bool:
         """Add a command.
 
         Args:
             v: Linear speed [m/s].
             w: Angular speed [rad/s].
-            duration: How long it was driven [s]; by default the period.
+            duration: How long the virtual robot drove it [s].
 
         Returns:
             Whether the path had room; if not, neither it nor the virtual robot's posture has changed, and what
@@ -325,16 +303,16 @@ class PathGenerator:
         """
         v = number_in("v", v, -100.0, 100.0, unit=" m/s")
         w = number_in("w", w, -1000.0, 1000.0, unit=" rad/s")
-        T = self._config.period if duration is None else number_in("duration", duration, 1e-9, 86_400.0, unit=" s")
+        T = number_in("duration", duration, 1e-9, 86_400.0, unit=" s")
         if v == 0.0 and w == 0.0:
             return True
-        posture = Posture(*advanced(self._posture, v, w, T))
-        if abs(v) <= self._config.pivot_radius * abs(w):
+        posture = Posture(*advanced(self.posture, v, w, T))
+        if abs(v) <= _PIVOT_RADIUS * abs(w):
             # Where |v| is tiny, w·T may be 0 in floating point only if w is.
             taken = self._path.append(Pivot(w * T), end=posture) if w * T else True
         else:
             length = abs(v) * T
             taken = self._path.append(Arc(w / abs(v), length, 1 if v > 0 else -1), end=posture) if length else True
         if taken:
-            self._posture = posture
+            self.posture = posture
         return taken

@@ -108,7 +108,7 @@ class PathFollowingController:
     ) -> None:
         """Take the path, which others make longer, and the law."""
         self._path = path
-        self._config = PathFollowingConfig() if config is None else config
+        self.config = PathFollowingConfig() if config is None else config
         self._law = FieldLaw(law)
         self._v = 0.0
         self._side = 0.0
@@ -119,11 +119,6 @@ class PathFollowingController:
         """Where the robot was beside the path at the last call."""
         self.direction = 0.0
         """Direction in which it was to travel then [rad]."""
-
-    @property
-    def config(self) -> PathFollowingConfig:
-        """Its constants."""
-        return self._config
 
     def control(self, posture: tuple[float, float, float], *, v_before: float | None = None) -> Drive:
         """Say what to drive until the next call.
@@ -144,14 +139,14 @@ class PathFollowingController:
             self.direction = wrapped(posture[2])
         else:
             drive = self._follow(place, posture[2])
-        config = self._config
+        config = self.config
         drive = kept(drive.v, drive.w, self._v, config.period, config.limits)
         self._v = drive.v
         return drive
 
     def _arrive(self, posture: tuple[float, float, float]) -> Projection:
         """Take as driven what is driven."""
-        config, path = self._config, self._path
+        config, path = self.config, self._path
         for _ in range(len(path) + 1):
             place = path.locate(posture)
             driven = (
@@ -166,7 +161,7 @@ class PathFollowingController:
 
     def _straighten(self, error: float) -> float:
         """The heading's law: K_ω √|θ_e|, but no more than the loop follows without ringing."""
-        config = self._config
+        config = self.config
         far = abs(error)
         w = config.K_w * math.sqrt(far)
         if config.response > 0:
@@ -174,14 +169,14 @@ class PathFollowingController:
         return math.copysign(w, error)
 
     def _pivot(self, turn: float) -> Drive:
-        config = self._config
+        config = self.config
         if abs(self._v) > config.limits.a_max * config.period:
             return STAND
         self._turning = math.copysign(1.0, turn)
         return Drive(0.0, clipped(self._straighten(turn), config.limits.w_max))
 
     def _follow(self, place: Projection, heading: float) -> Drive:
-        config = self._config
+        config = self.config
         theta = heading if place.direction > 0 else heading + math.pi
         aim = field_direction(place.l, place.theta_d, config)
         self.direction = aim
@@ -208,7 +203,7 @@ class PathFollowingController:
 
     def _curvature_soon(self, place: Projection) -> float:
         """Curvature where the robot will be once the motors have answered."""
-        reach = abs(self._v) * self._config.response
+        reach = abs(self._v) * self.config.response
         found = place.curvature
         for _, found in self._path.ahead(reach):  # noqa: B007
             pass
@@ -216,7 +211,7 @@ class PathFollowingController:
 
     def _speed(self, place: Projection, error: float, per_metre: float) -> float:
         """The capped speed along the path [m/s], not negative."""
-        config = self._config
+        config = self.config
         limits = config.limits
         reaction = config.period + config.lag
         speed = min(config.cruise, limits.v_max, config.K_v * place.left)

@@ -100,7 +100,7 @@ def last_output(count: int, interval: float) -> float:
     queue: CommandFilter[int] = CommandFilter(CommandFilterConfig(interval))
     for k in range(count):
         queue.receive(k, now=0.0)
-    return queue.advance(now=1e6)[-1].t
+    return queue.advance(now=1e6)[-1][0]
 
 
 def work_filter(_study: Study, _case: str) -> Findings:

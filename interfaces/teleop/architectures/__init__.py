@@ -15,21 +15,18 @@ from interfaces.teleop.architectures.controllers import (
     Filtered,
     FollowingController,
     Immediate,
-    PlayerConfig,
     TimelineController,
 )
 from interfaces.teleop.architectures.sites import (
     ArchitectureOperatorSite,
     ArchitectureRobotSite,
     DriveController,
-    PositionSource,
     Transport,
 )
-from interfaces.teleop.architectures.surroundings import Aim, OperatorSurroundings, RobotSurroundings, Sonar
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 
 __all__ = [
     "ARCHITECTURES",
-    "Aim",
     "Architecture",
     "ArchitectureOperatorSite",
     "ArchitectureRobotSite",
@@ -39,10 +36,7 @@ __all__ = [
     "FollowingController",
     "Immediate",
     "OperatorSurroundings",
-    "PlayerConfig",
-    "PositionSource",
     "RobotSurroundings",
-    "Sonar",
     "TimelineController",
     "Transport",
     "architecture",

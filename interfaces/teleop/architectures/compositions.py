@@ -8,18 +8,16 @@ from dataclasses import dataclass, field
 from typing import Annotated, Final, TypeAlias
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.system import checked, is_own, own
 from interfaces.teleop.architectures.controllers import (
     Filtered,
     FollowingController,
     Immediate,
-    PlayerConfig,
     TimelineController,
 )
-from interfaces.teleop.architectures.sites import DriveController, PositionSource
-from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings, Sonar
+from interfaces.teleop.architectures.sites import DriveController
+from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.base import MobileBase
 from robots.bullet.rooms import EMPTY, Room
 from robots.ipr.floor_plan import FloorPlan
@@ -29,6 +27,7 @@ from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, 
 from robots.ipr.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
+from robots.onboard.following import PositionSource
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
@@ -47,8 +46,6 @@ class Constants:
     """T_p: to make a piece of the path of one command [s], shorter than T."""
     following: PathFollowingConfig = field(default_factory=PathFollowingConfig)
     """Of the uni-vector field, III."""
-    player: PlayerConfig = field(default_factory=PlayerConfig)
-    """Of the `timeline` architecture."""
 
     def __post_init__(self) -> None:
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
@@ -59,9 +56,7 @@ Architecture: TypeAlias = Callable[[Constants, Posture], DriveController]
 
 
 def _following(law: FieldLaw) -> Architecture:
-    return lambda c, posture: FollowingController(
-        posture, law, c.following, period=c.period, processing=c.processing
-    )
+    return lambda c, posture: FollowingController(posture, law, c.following, processing=c.processing)
 
 
 ARCHITECTURES: Final[dict[str, Architecture]] = {
@@ -70,7 +65,7 @@ ARCHITECTURES: Final[dict[str, Architecture]] = {
     "III": _following(FieldLaw.LITERAL),
     "III-capped": _following(FieldLaw.CAPPED),
     "extended": _following(FieldLaw.CAPPED),
-    "timeline": lambda c, posture: TimelineController(posture, now=0.0, config=c.player),
+    "timeline": lambda _, posture: TimelineController(posture, now=0.0),
 }
 """What makes each architecture's controller."""
 
@@ -123,17 +118,10 @@ MARGIN = 0.02
 """Of the virtual robot's circle round the real one's outline [m]."""
 
 
-class BodySonar(Sonar):
-    """A real robot's sonars."""
-
-    def __init__(self, body: MobileRobot, since: float = 0.0) -> None:
-        """Take the robot; times count from `since` [s] of its own."""
-        self._body, self._since = body, since
-
-    @override
-    def scan(self) -> tuple[float, Sequence[float]] | None:
-        scan = self._body.sonar
-        return None if scan is None else (scan.time - self._since, scan.ranges.tolist())
+def echoes_of(body: MobileRobot, since: float) -> tuple[float, Sequence[float]] | None:
+    """When a robot's newest sonar scan was taken, from `since` on [s], and its ranges [m]; None without one."""
+    scan = body.sonar
+    return None if scan is None else (scan.time - since, scan.ranges.tolist())
 
 
 def grid_of(room: Room, start: Posture) -> Grid:
@@ -182,12 +170,12 @@ def robot_surroundings(
     careful = AvoidanceConfig(outline, mounts, half_cone=half_cone, range_min=near, range_max=far, period=period)
     avoidance = ObstacleAvoidance(careful)
     return RobotSurroundings(
-        BodySonar(body, since),
+        lambda: echoes_of(body, since),
         EnvironmentSupervisor(grid, _known(body.room, grid, body.chassis.sonar_height), seen),
         avoidance,
         MoverTracker(MoversConfig(mounts, half_cone=half_cone)),
         Yielding(YieldingConfig(outline), avoidance),
-        controller if isinstance(controller, FollowingController) else None,
+        controller.aim if isinstance(controller, FollowingController) else None,
     )
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from typing_extensions import override
 
@@ -17,13 +16,16 @@ from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
-from robots.onboard.path import MovingPath, PathGenerator, PathGeneratorConfig
+from robots.onboard.path import MovingPath, PathGenerator
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
-from robots.onboard.trajectory_tracking import Reference, TrackingConfig, TrajectoryTracker
+from robots.onboard.trajectory_tracking import Reference, TrajectoryTracker
 from vrs.segment import ArcSegment
 
 STARVED = 0.5
 """Architecture I holds a command until the next, but no longer than this [s]: the robot's watchdog."""
+_OFFSET = OffsetConfig(share=0.6)
+"""Of D, one set for every delay. What comes later than that share makes the robot slow down and catch up, but not
+leave the path: so D needn't cover the longest delays."""
 _ROUNDING = 1e-9
 """Times nearer than this [s] are one."""
 
@@ -67,9 +69,8 @@ class Filtered(DriveController):
     @override
     def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Drive what the filter gave out last, for as long as the operator did."""
-        for output in self._filter.advance(now=now + _ROUNDING):
-            arc = output.command
-            self._drive, self._until = Drive(arc.v, arc.w), output.t + arc.duration
+        for t, arc in self._filter.advance(now=now + _ROUNDING):
+            self._drive, self._until = Drive(arc.v, arc.w), t + arc.duration
             self.executed += 1
         return self._drive if now < self._until - _ROUNDING else STAND
 
@@ -77,21 +78,18 @@ class Filtered(DriveController):
 class FollowingController(DriveController):
     """Architecture III: the filter at T_p feeds the path generator; the uni-vector field follows the path."""
 
-    def __init__(
-        self, posture: Posture, law: FieldLaw, config: PathFollowingConfig, *, period: float, processing: float
-    ) -> None:
+    def __init__(self, posture: Posture, law: FieldLaw, config: PathFollowingConfig, *, processing: float) -> None:
         """Begin a path.
 
         Args:
             posture: Where it begins.
             law: Eq. (14)–(15) literally, or capped.
             config: Of the field.
-            period: T, what a command lasts [s].
             processing: T_p, what one takes to become a piece of the path [s].
         """
         self._filter: CommandFilter[ArcSegment] = CommandFilter(CommandFilterConfig(processing))
         self._path = MovingPath(posture)
-        self._generator = PathGenerator(self._path, PathGeneratorConfig(period))
+        self._generator = PathGenerator(self._path)
         self._controller = PathFollowingController(self._path, config, law=law)
         self._arrival = config.arrival
         self._ends: deque[float] = deque()
@@ -106,8 +104,7 @@ class FollowingController(DriveController):
 
     def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Lengthen the path, and follow it."""
-        for output in self._filter.advance(now=now + _ROUNDING):
-            arc = output.command
+        for _, arc in self._filter.advance(now=now + _ROUNDING):
             self._generator.receive(arc.v, arc.w, duration=arc.duration)
             self._ends.append(self._path.length)
         drive = self._controller.control(posture, v_before=v_before)
@@ -118,42 +115,26 @@ class FollowingController(DriveController):
             self.executed += 1
         return drive
 
-    @property
-    def direction(self) -> float:
-        """Where the field pointed at the last call [rad]."""
-        return self._controller.direction
+    def aim(self) -> tuple[float, float, tuple[float, float] | None]:
+        """Tell where it wanted to get at the last call.
 
-    @property
-    def left(self) -> float:
-        """Way on the known path to where the robot is to stand [m], as at the last call."""
+        Returns:
+            Where the field pointed [rad]; the way on the known path to where the robot is to stand [m]; and where
+            on the path it should be [m], None before the first call.
+        """
         place = self._controller.projection
-        return 0.0 if place is None else place.to_stop
-
-    @property
-    def nearest(self) -> tuple[float, float] | None:
-        """Where on the path the robot should be [m], as at the last call; None before it."""
-        place = self._controller.projection
-        return None if place is None else (place.x, place.y)
-
-
-@dataclass(frozen=True, slots=True)
-class PlayerConfig:
-    """How the `timeline` architecture plays. One set serves every delay."""
-
-    tracking: TrackingConfig = field(default_factory=TrackingConfig)
-    offset: OffsetConfig = field(default_factory=lambda: OffsetConfig(share=0.6))
-    """Of D. What comes later than that share makes the robot slow down and catch up, but not leave the path: so D
-    needn't cover the longest delays."""
+        if place is None:
+            return self._controller.direction, 0.0, None
+        return self._controller.direction, place.to_stop, (place.x, place.y)
 
 
 class TimelineController:
     """Architecture `timeline`: plays the operator's path D behind him, D adaptive, and tracks it."""
 
-    def __init__(self, posture: Posture, *, now: float, config: PlayerConfig) -> None:
+    def __init__(self, posture: Posture, *, now: float) -> None:
         """Begin where the operator's path does, by the robot's clock at `now` [s]."""
-        self._config = config
-        self._tracker = TrajectoryTracker(posture, 0.0, now=now, config=config.tracking)
-        self._offset = AdaptiveOffset(config.offset)
+        self._tracker = TrajectoryTracker(posture, 0.0, now=now)
+        self._offset = AdaptiveOffset(_OFFSET)
         self.D: float | None = None
         """How far behind the robot's clock it plays, D ≤ 0 [s]; None before the first packet."""
         self._ends: deque[float] = deque()

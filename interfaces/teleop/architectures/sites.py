@@ -12,6 +12,7 @@ from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, A
 from interfaces.messages.recording import CommandRecord
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.onboard.driving import STAND, Drive, Posture, kept
+from robots.onboard.following import PositionSource
 from vrs import DriveCommand, Engine, ManualClock
 from vrs.engine import MobileEngine
 from vrs.mobile import DriveLimits, MobileModel, PostureEstimator
@@ -66,13 +67,6 @@ class DriveController(Protocol):
     """Index j of eq. (9): how many of the operator's commands the robot has executed."""
 
 
-class PositionSource(Protocol):
-    """Whatever tells a robot where it is."""
-
-    def posture(self) -> Posture:
-        """(x, y, θ) [m, m, rad], now."""
-
-
 class ArchitectureOperatorSite:
     """The virtual robot, which answers at once; the posture estimator; and what is sent."""
 
@@ -103,7 +97,8 @@ class ArchitectureOperatorSite:
         """Where the real robot is thought to be after all commands."""
         self._transport = transport
         self._arcs: Outgoing[ArcSegment] = Outgoing()
-        self._end = posture
+        self.posture = posture
+        """Where the virtual robot is after all commands."""
         self._model = model
         self.surroundings = surroundings
         """What the virtual robot avoids, if anything."""
@@ -111,11 +106,6 @@ class ArchitectureOperatorSite:
         """Is told of each command at once."""
         self.before = STAND
         """What was driven last."""
-
-    @property
-    def posture(self) -> Posture:
-        """Where the virtual robot is after all commands."""
-        return self._end
 
     def drive(self, v: float, w: float, *, now: float) -> ArcPacket:
         """Carry out a command of the operator, as far as the limits allow.
@@ -130,7 +120,7 @@ class ArchitectureOperatorSite:
         """
         period = self._model.period
         if self.surroundings is not None:
-            v, w = self.surroundings.command(Drive(v, w), self.before, self._end, now=now)
+            v, w = self.surroundings.command(Drive(v, w), self.before, self.posture, now=now)
         v, w = self.before = Drive(*limited((v, w), self.before, period, self._model.limits))
         self._clock.advance(now - self._clock.now())
         start = max(self.engine.timeline.end, now)
@@ -139,9 +129,9 @@ class ArchitectureOperatorSite:
         if self.listener is not None:
             self.listener(CommandRecord(0, self._clock.now(), command, receipt))
         self.estimator.command(v, w)
-        arc = known_arc(start, period, self._end, v, w, receipt.command_id)
+        arc = known_arc(start, period, self.posture, v, w, receipt.command_id)
         self._arcs.add(arc)
-        self._end = Posture(*advanced(self._end, v, w, period))
+        self.posture = Posture(*advanced(self.posture, v, w, period))
         return self._packet(arc.end, self._tail(arc))
 
     def repeat(self) -> ArcPacket:
@@ -172,7 +162,7 @@ class ArchitectureOperatorSite:
 
     def _tail(self, arc: ArcSegment) -> list[ArcSegment]:
         """How the virtual robot brakes, unless the operator goes on."""
-        start, posture, T = arc.end, self._end, self._model.period
+        start, posture, T = arc.end, self.posture, self._model.period
         tail = []
         for v, w in braking((arc.v, arc.w), T, self._model.limits):
             tail.append(known_arc(start, T, posture, v, w))

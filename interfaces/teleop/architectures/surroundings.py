@@ -6,8 +6,7 @@ Source: Han, Kim, Kim, Kim, 2001, section 3.2 and Fig. 10.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 from robots.onboard.avoidance import ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
@@ -84,42 +83,30 @@ class OperatorSurroundings:
         return Drive(*found)
 
 
-class Sonar(Protocol):
-    """Whatever hears echoes for a robot."""
-
-    def scan(self) -> tuple[float, Sequence[float]] | None:
-        """When the newest scan was taken [s] and its ranges [m], infinite without echo; None before the first."""
-
-
-class Aim(Protocol):
-    """A controller that knows where it wants to get."""
-
-    @property
-    def direction(self) -> float:
-        """In which direction it wants to travel [rad]."""
-
-    @property
-    def left(self) -> float:
-        """Way after which it's to stand [m]."""
-
-    @property
-    def nearest(self) -> tuple[float, float] | None:
-        """The place on its path where it should be [m]; None while it has no path."""
-
-
 class RobotSurroundings:
     """Sonar, the virtual environment supervisor, and obstacle avoidance between controller and drive."""
 
     def __init__(
         self,
-        sonar: Sonar,
+        sonar: Callable[[], tuple[float, Sequence[float]] | None],
         supervisor: EnvironmentSupervisor,
         avoidance: ObstacleAvoidance,
         movers: MoverTracker,
         yielding: Yielding,
-        aim: Aim | None = None,
+        aim: Callable[[], tuple[float, float, tuple[float, float] | None]] | None = None,
     ) -> None:
-        """Take the parts, and the controller if it knows where it wants to get."""
+        """Take the parts.
+
+        Args:
+            sonar: Tells when the newest scan was taken [s] and its ranges [m], infinite without echo; None before
+                the first.
+            supervisor: Of the virtual environment.
+            avoidance: Of what stands.
+            movers: Follows who walks.
+            yielding: Goes out of their way.
+            aim: Tells where a controller that knows it wants to get: in which direction [rad], the way after which
+                it's to stand [m], and the place on its path where it should be [m], None while it has no path.
+        """
         self._movers, self._yielding = movers, yielding
         self.supervisor = supervisor
         self._sonar, self._avoidance, self._aim = sonar, avoidance, aim
@@ -137,7 +124,7 @@ class RobotSurroundings:
             now: By the robot's clock [s].
             v_before: Linear speed that it was told to drive last [m/s].
         """
-        scan = self._sonar.scan()
+        scan = self._sonar()
         if scan is not None and scan[0] > self._heard:
             self._heard = scan[0]
             where = self._at(scan[0], posture, now)
@@ -154,14 +141,14 @@ class RobotSurroundings:
 
         A field leads to a path along which there's way left. Beside its end, or a pivot, it doesn't.
         """
-        aim = self._aim
-        if aim is None:
+        if self._aim is None:
             return wanted, posture.theta + _STEERED * wanted.w, math.inf
-        x, y = posture[:2] if aim.nearest is None else aim.nearest
+        direction, left, nearest = self._aim()
+        x, y = posture[:2] if nearest is None else nearest
         off = math.hypot(x - posture.x, y - posture.y)
-        self._rejoins = aim.left < off and off > (_BACK if self._rejoins else _AWAY)
+        self._rejoins = left < off and off > (_BACK if self._rejoins else _AWAY)
         if not self._rejoins:
-            return wanted, aim.direction, aim.left
+            return wanted, direction, left
         towards = math.atan2(y - posture.y, x - posture.x)
         error = wrapped(towards - posture.theta)
         if abs(error) > _ASIDE:

@@ -28,11 +28,11 @@ from interfaces.jobs.runner import (
 from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
 from interfaces.messages.fields import MOST_POINTS
 from interfaces.messages.jobs import ArmJob, ListCommand, MoveJob, OperatorLoss, VoiceJob
-from interfaces.teleop.architectures import PositionSource
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import STAND, Drive, Posture, is_still
+from robots.onboard.following import PositionSource
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
 from robots.onboard.laser import LaserScan, beam_angles
 from robots.onboard.routes import Point

@@ -11,12 +11,12 @@ from typing_extensions import override
 
 from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport
 from interfaces.messages.fields import Epoch
-from interfaces.teleop.architectures import ArchitectureRobotSite, PositionSource, TimelineController
+from interfaces.teleop.architectures import ArchitectureRobotSite, TimelineController
 from interfaces.teleop.connection import LOST, Host, OrderExecutor, lost
 from interfaces.teleop.driving.autonomy import Autonomy
 from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
-from robots.onboard.following import SoundPosition
+from robots.onboard.following import PositionSource, SoundPosition
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import braking

@@ -103,7 +103,7 @@ def test_a_sealed_packets_number_is_its_counters() -> None:
     session, before = pair.local.numbers, state(pair)
     number = session.number
     head = header.Header(MODEL.id, True, PacketType.DOWN, number, 0, session.id, 0, 0)
-    data = session.sealer.seal(header.encode(head), b"\0\0", number + 1)
+    data = session.cipher.seal(header.encode(head), b"\0\0", number + 1)
     pair.robot.receive(data, ADDRESS, now=pair.now)
     assert pair.robot.dropped[DropReason.MALFORMED] == 1
     assert state(pair) == before

@@ -32,7 +32,7 @@ def scan(
 
 def errors(posture: Posture, noise: float, rng: np.random.Generator) -> list[Array]:
     """What the lines on the left and the right wall are off, in their own deviations, (k, 2)."""
-    found = extract(deskewed(scan(posture, noise, rng)), ExtractionConfig(), noise).lines
+    found, _ = extract(deskewed(scan(posture, noise, rng)), ExtractionConfig(), noise)
     placed = found.moved(posture)
     made = []
     for pose, variance in zip(placed.poses, placed.variances, strict=True):
@@ -60,7 +60,7 @@ def test_lines_are_as_sure_as_they_say(noise: float) -> None:
 
 def test_without_noise_lines_are_exact_and_the_free_side_is_on_the_left() -> None:
     posture = (2.0, 2.0, 0.3)
-    found = extract(deskewed(scan(posture, 0.0, np.random.default_rng(0))), ExtractionConfig(), 1e-3).lines
+    found, _ = extract(deskewed(scan(posture, 0.0, np.random.default_rng(0))), ExtractionConfig(), 1e-3)
     placed = found.moved(posture)
     expected = [(1, 0.05, 0.0), (1, 3.95, math.pi), (0, 5.95, math.pi / 2), (0, 5.1, math.pi / 2)]
     for axis, face, direction in expected:
@@ -74,7 +74,7 @@ def test_the_noise_is_told_by_the_lines() -> None:
     rng = np.random.default_rng(3)
     for noise in (0.005, 0.01, 0.02):
         said = [
-            extract(deskewed(scan((2.0, 2.0, 0.0), noise, rng)), ExtractionConfig(), noise).noise for _ in range(15)
+            extract(deskewed(scan((2.0, 2.0, 0.0), noise, rng)), ExtractionConfig(), noise)[1] for _ in range(15)
         ]
         assert np.mean(said) == pytest.approx(noise, rel=0.1)
 
@@ -82,12 +82,12 @@ def test_the_noise_is_told_by_the_lines() -> None:
 @pytest.mark.parametrize("beams", [181, 361, 721])
 def test_a_column_is_no_line_and_few_points_are_none(beams: int) -> None:
     rng = np.random.default_rng(5)
-    found = extract(deskewed(scan((2.0, 2.6, 0.0), 0.005, rng, beams)), ExtractionConfig(length=0.3), 0.005).lines
+    found, _ = extract(deskewed(scan((2.0, 2.6, 0.0), 0.005, rng, beams)), ExtractionConfig(length=0.3), 0.005)
     placed = found.moved((2.0, 2.6, 0.0))
     assert len(placed) >= 3
     assert (np.hypot(placed.poses[:, 0] - 4, placed.poses[:, 1] - 2.6) > 0.3).all()
     nothing = LaserScan(0.0, np.full(beams, np.inf))
-    assert len(extract(deskewed(nothing), ExtractionConfig()).lines) == 0
+    assert len(extract(deskewed(nothing), ExtractionConfig())[0]) == 0
     few = np.full(beams, np.inf)
     few[10:14] = 1.0
-    assert len(extract(deskewed(LaserScan(0.0, few)), ExtractionConfig()).lines) == 0
+    assert len(extract(deskewed(LaserScan(0.0, few)), ExtractionConfig())[0]) == 0

@@ -6,6 +6,7 @@ import itertools
 import math
 import os
 import random
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -15,7 +16,7 @@ from interfaces.lab.driving.run import run
 from interfaces.messages.drive_sites import ArchitectureReport
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
-from interfaces.teleop.architectures.compositions import BodySonar, grid_of
+from interfaces.teleop.architectures.compositions import echoes_of, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.chassis import IPR, SonarModel
 from robots.ipr.floor_plan import FloorPlan
@@ -128,41 +129,26 @@ def test_changes_count_on_the_wire() -> None:
     assert full.size == 48 + 10 + 6 * len(BLOCK)
 
 
-class Silent:
-    """Sonars that hear one scan, of some time ago, and then nothing."""
-
-    def __init__(self, time: float) -> None:
-        self.time = time
-
-    def scan(self) -> tuple[float, list[float]]:
-        return self.time, [0.5, math.inf]
-
-
-class AtItsEnd:
-    """A controller whose path has ended here."""
-
-    direction, left, nearest = 0.0, 0.0, (0.0, 0.0)
-
-
-def on_board(sonar: Silent) -> RobotSurroundings:
+def on_board(heard_at: Callable[[], float] = lambda: -10.0) -> RobotSurroundings:
+    """A robot whose newest scan is of then, and whose controller's path has ended here."""
     mounts = (SonarMount(0.2, 0.0, 0.0), SonarMount(-0.3, 0.0, math.pi))
     outline = Outline(0.2, 0.32, 0.225)
     avoidance = ObstacleAvoidance(AvoidanceConfig(outline, mounts, memory=0.0))
     grid = Grid((60, 40), 0.1, (-3.0, -2.0))
     return RobotSurroundings(
-        sonar,
+        lambda: (heard_at(), [0.5, math.inf]),
         EnvironmentSupervisor(grid, np.zeros(grid.shape, bool), SupervisorConfig(mounts)),
         avoidance,
         MoverTracker(MoversConfig(mounts)),
         Yielding(YieldingConfig(outline), avoidance),
-        AtItsEnd(),
+        lambda: (0.0, 0.0, (0.0, 0.0)),
     )
 
 
 @pytest.mark.parametrize("bearing_deg", range(0, 360, 40))
 def test_beside_the_end_of_its_path_the_robot_comes_back(bearing_deg: int) -> None:
     """What it went out of the way of has gone; the field would lead along the path, on which nothing is left."""
-    here, b = on_board(Silent(-10.0)), math.radians(bearing_deg)
+    here, b = on_board(), math.radians(bearing_deg)
     posture, drive = Posture(math.cos(b), math.sin(b), 0.3), Drive(0.0, 0.0)
     for k in range(400):
         drive = here.drive(Drive(0.0, 0.0), posture, now=0.05 * k, v_before=drive.v)
@@ -172,16 +158,16 @@ def test_beside_the_end_of_its_path_the_robot_comes_back(bearing_deg: int) -> No
 
 
 def test_a_robot_that_is_hardly_off_is_left_to_its_controller() -> None:
-    here = on_board(Silent(-10.0))
+    here = on_board()
     assert here.drive(Drive(0.02, 0.1), Posture(0.1, 0.1, 0.0), now=0.0, v_before=0.0) == Drive(0.02, 0.1)
 
 
 def test_a_scan_is_placed_where_the_robot_was_when_it_was_taken() -> None:
     # A scan of 0.02 s comes at 0.04 s, when the robot is a metre further: half of it counts.
-    sonar = Silent(-1.0)
-    late = on_board(sonar)
+    times = [-1.0]
+    late = on_board(lambda: times[-1])
     late.drive(Drive(0.0, 0.0), Posture(0.0, 0.0, 0.0), now=0.0, v_before=0.0)
-    sonar.time = 0.02
+    times.append(0.02)
     late.drive(Drive(0.0, 0.0), Posture(1.0, 0.0, 0.0), now=0.04, v_before=0.0)
     # From x = 0.5 the sonar, 0.2 m before it, hears something 0.5 m ahead: 1.2 m, cell 42.
     assert (42, 20) in late.supervisor.obstacles
@@ -255,7 +241,7 @@ def test_on_a_drive_echoes_are_as_old_as_the_drive_says() -> None:
     with BareBody("ipr", room=place("furnished"), rng=0) as body:
         while body.time < 5.0:
             body.drive(0.0, 0.0, 30)
-        scan, own = BodySonar(body, 4.0).scan(), body.sonar
+        scan, own = echoes_of(body, 4.0), body.sonar
         assert scan is not None
         assert own is not None
         assert scan[0] == pytest.approx(own.time - 4.0)
