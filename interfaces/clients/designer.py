@@ -9,7 +9,7 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
-from interfaces.clients.ports import EnginePort, port_to
+from interfaces.clients.ports import RemotePort, port_to
 from interfaces.engine_server.site import earliest
 from interfaces.link.delivery import Resending
 from interfaces.messages import Order, Outcome, RefusalCode, Reply
@@ -66,7 +66,7 @@ class Designer:
     Over a link, a command is sent again until it's answered; the servlet carries it out once.
     """
 
-    def __init__(self, engine: EnginePort | Engine, *, resend: float = 0.3, repeat: int = 2) -> None:
+    def __init__(self, engine: RemotePort | Engine, *, resend: float = 0.3, repeat: int = 2) -> None:
         """Reach an engine.
 
         Args:

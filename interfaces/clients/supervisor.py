@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from interfaces.clients.designer import Designer, Issued
 from interfaces.clients.observer import Observation, Observer
-from interfaces.clients.ports import EnginePort, port_to
+from interfaces.clients.ports import RemotePort, port_to
 from interfaces.engine_server.site import earliest
 from interfaces.messages import Reply
 from vrs.commands import Command
@@ -17,7 +17,7 @@ from vrs.engine import Engine
 class Supervisor:
     """Specifies the trajectory, and collects feedback."""
 
-    def __init__(self, engine: EnginePort | Engine, *, resend: float = 0.3) -> None:
+    def __init__(self, engine: RemotePort | Engine, *, resend: float = 0.3) -> None:
         """Reach an engine by one port; see `Designer` and `Observer`."""
         port, self._own = port_to(engine)
         self.designer = Designer(port, resend=resend)
