@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,20 +31,16 @@ class ShadedMesh(NamedTuple):
     """Indices of vertices, (m, 3)."""
 
 
-class Bodies(NamedTuple):
-    """What a robot looks like."""
-
-    meshes: tuple[ShadedMesh, ...]
-    """A mesh for the base and for each link, in its frame; none for a robot without shapes."""
-    floor: float
-    """Lowest point of the base in its frame [m]; 0 for a robot without shapes."""
+Bodies: TypeAlias = tuple[tuple[ShadedMesh, ...], float]
+"""What a robot looks like: a mesh for the base and for each link, in its frame, and the lowest point of the base in
+its frame [m]; none and 0 for a robot without shapes."""
 
 
 def bodies(robot: Robot) -> Bodies:
     """Make the meshes of a robot; the first time that takes a second, most of it to load trimesh."""
     shapes = robot.shapes()
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
-    return Bodies(tuple(shaded(shape) for shape in shapes), floor)
+    return tuple(shaded(shape) for shape in shapes), floor
 
 
 def shaded(shape: LinkShape) -> ShadedMesh:
