@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
-from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want, control
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Want, control
 from interfaces.messages.control import (
     Impair,
     Network,
@@ -21,6 +21,10 @@ from interfaces.messages.control import (
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode, sent_by
 from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
+
+if TYPE_CHECKING:
+    from interfaces.engine_server.servlet import Servlet
+    from interfaces.stream.driving import DriveServlet
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
@@ -51,22 +55,6 @@ News: TypeAlias = Tasks | Seen | Plan
 """What every client is told when it changes: of each kind the newest counts."""
 
 
-class Served(Protocol):
-    """What serves one client's orders and questions; times are the robot's site's [s]."""
-
-    def receive(self, message: Request, *, now: float) -> None:
-        """Take a message of the client."""
-
-    def advance(self, *, now: float) -> tuple[Value, ...]:
-        """What is to be sent to it."""
-
-    def next_deadline(self) -> float | None:
-        """When there's something to be sent; −∞ for at once."""
-
-    def close(self) -> None:
-        """The client is gone for good."""
-
-
 class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
@@ -74,7 +62,7 @@ class SessionState:
 
     def __init__(self, key: str, name: str, role: Role) -> None:
         self.key, self.name, self.role = key, name, role
-        self.servlet: Served
+        self.servlet: Servlet | DriveServlet
         self.session: HubSession | None = None
         self.left = 0.0
         """When its connection was lost [s]."""
