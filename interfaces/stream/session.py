@@ -20,7 +20,7 @@ from interfaces.messages.control import (
 )
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode, sent_by
-from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
+from interfaces.stream.limits import Allowance, Bucket, ClientLimits, Outbox
 
 if TYPE_CHECKING:
     from interfaces.engine_server.servlet import Servlet
@@ -111,13 +111,15 @@ class HubApi(Protocol):
 class HubSession:
     """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
 
-    def __init__(self, desk: HubApi, encoding: Encoding, spending: Spending, *, now: float) -> None:
+    def __init__(
+        self, desk: HubApi, encoding: Encoding, spending: tuple[Allowance, Allowance], *, now: float
+    ) -> None:
         """Wait for `Hello`.
 
         Args:
             desk: The hub.
             encoding: How its messages are written.
-            spending: What it may cost.
+            spending: What it may cost while it doesn't command, and while it does.
             now: Session time [s].
         """
         self._spending, self._told = spending, 0
@@ -192,12 +194,12 @@ class HubSession:
             now: Session time [s].
         """
         total = self._outbox.total
-        self._spending.spend(work, total - self._told, commands=self.commands, now=now)
+        self._spending[self.commands].spend(work, total - self._told, now=now)
         self._told = total
 
     def wait(self, *, now: float) -> float:
         """How long nothing more of the client is to be looked at [s]; 0 for at once."""
-        return 0.0 if self.closing is not None else self._spending.wait(commands=self.commands, now=now)
+        return 0.0 if self.closing is not None else self._spending[self.commands].wait(now=now)
 
     def _hear(self, data: bytes | str, now: float) -> None:
         if self.closing is not None:

@@ -8,7 +8,7 @@ import resource
 import socket
 from asyncio.transports import BaseTransport, Transport
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
 
@@ -400,14 +400,6 @@ def let_stay(scope: Scope, *, known: bool) -> None:
         connection.let_stay(known=known)
 
 
-class _Server(uvicorn.Server):
-    """Leaves signals to whoever runs it."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        yield
-
-
 def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
     """Make a listening socket with small buffers, which its connections inherit.
 
@@ -468,7 +460,9 @@ async def serve(
         timeout_graceful_shutdown=1,
         backlog=BACKLOG,
     )
-    server = _Server(config)
+    server = uvicorn.Server(config)
+    # Signals are left to whoever runs it.
+    server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
     looking = asyncio.create_task(_cut_off_overdue(state))
     task = asyncio.create_task(server.serve(sockets=[listening]))
