@@ -15,7 +15,7 @@ from benchmarks.moves import MODEL
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces import messages as m
 from interfaces.clients.ports import RemotePort
-from interfaces.clients.viewer_sources import Mirror
+from interfaces.clients.viewer_sources import SegmentSource
 from interfaces.engine_server.broadcast import CompactSlot
 from interfaces.engine_server.site import Site
 from interfaces.messages.compact import CompactDecoder, CompactEncoder
@@ -74,7 +74,7 @@ def part() -> Part:
 def _session(encoding: Encoding) -> tuple[float, float, float, Site]:
     """A session: bytes a second, share of the time that the arm moves, error of the copy [rad], the site."""
     site, port = Site(Engine(MODEL, q=HOME, clock=ManualClock(0.0))), RemotePort()
-    servlet, mirror = site.servlet(), Mirror(port, resend=1.0)
+    servlet, mirror = site.servlet(), SegmentSource(port, resend=1.0)
     mirror.advance(now=0.0)
     rng, size, moving, error, q = np.random.default_rng(0), 0, 0.0, 0.0, HOME
     for k in range(SECONDS * RATE):

@@ -1,8 +1,7 @@
 """Everything that joins a person or a machine to a robot."""
 
-from interfaces.clients.designer import Designer
+from interfaces.clients.designer import Designer, Supervisor
 from interfaces.clients.observer import Observer
-from interfaces.clients.supervisor import Supervisor
 from interfaces.clients.viewer import Viewer
 from interfaces.connecting import connect, connect_mobile
 

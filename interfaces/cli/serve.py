@@ -328,7 +328,7 @@ async def _serve(
         from interfaces.station.chain import described
         from interfaces.station.page import Station
         from interfaces.station.panels import PANELS
-        from interfaces.station.record import RecordingFacts, Recordings
+        from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
         from interfaces.stream.server import application
@@ -350,8 +350,10 @@ async def _serve(
         near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
         val = ServedVal(f"ws://{near}/ws", doors.own_token, doors.val_files, software())
         terminals = PageTerminalServer(val.enter, access).route
-        facts = RecordingFacts(shelved.offset, shelved.link_loss, _recording_failed)
-        recordings = Recordings(operator, Shelf(shelved.directory, arm), access, facts)
+        recordings = Recordings(
+            operator, Shelf(shelved.directory, arm), access,
+            offset=shelved.offset, link_loss=shelved.link_loss, failed=_recording_failed,
+        )  # fmt: skip
         routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
         app = application(routes, doors.allowed(port))
         await stack.enter_async_context(station.running())

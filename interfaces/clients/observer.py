@@ -9,7 +9,7 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
-from interfaces.clients.ports import EnginePort, port_to
+from interfaces.clients.ports import RemotePort, port_to
 from interfaces.engine_server.site import earliest
 from interfaces.link.delivery import Resending
 from interfaces.messages import Answer, Ask, Frame, FrameStatus, Reply
@@ -62,7 +62,7 @@ class Observer:
     What's predicted is asked for again when its time has passed, until its fate is known.
     """
 
-    def __init__(self, engine: EnginePort | Engine, *, resend: float = 0.3) -> None:
+    def __init__(self, engine: RemotePort | Engine, *, resend: float = 0.3) -> None:
         """Reach an engine.
 
         Args:

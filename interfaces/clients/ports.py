@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, Protocol
 
-from typing_extensions import override
-
 from interfaces.engine_server.site import Site, earliest
+from interfaces.link.link import Direction
 from interfaces.messages import Reply, Request
 from vrs.engine import Engine
 
@@ -22,27 +21,8 @@ class Client(Protocol):
         """Take a reply at the user's time now [s]; those for others are passed over."""
 
 
-class EnginePort(Protocol):
-    """What a Designer, Observer or Viewer needs of an engine."""
-
-    def join(self, client: Client) -> None:
-        """Let a client have every reply."""
-
-    def leave(self, client: Client) -> None:
-        """Let it have none any more."""
-
-    def number(self) -> int:
-        """A new number for a question, or for following."""
-
-    def order_number(self) -> int:
-        """A new number for an order; they follow each other without a gap."""
-
-    def send(self, message: Request, *, now: float) -> None:
-        """Put a request on its way at the user's time now [s]."""
-
-
-class RemotePort(EnginePort):
-    """The client's end of a connection; a transport takes what it sends, and brings what arrives."""
+class RemotePort:
+    """The client's end of a connection: a transport takes what is sent by it, and brings what arrives."""
 
     def __init__(self) -> None:
         self._clients: tuple[Client, ...] = ()
@@ -67,9 +47,8 @@ class RemotePort(EnginePort):
         self._order_number += 1
         return self._order_number
 
-    @override
-    def send(self, message: Request, *, now: float) -> None:
-        """Put a request into the outbox."""
+    def send(self, message: Request, *, now: float) -> None:  # noqa: ARG002 - a transport has its own time
+        """Put a request on its way at the user's time now [s]."""
         self._outbox.append(message)
 
     def receive(self, message: Reply, *, now: float) -> None:
@@ -119,28 +98,12 @@ class LocalPort(RemotePort):
         return None if t is None else t - self.site.D
 
 
-def port_to(engine: EnginePort | Engine) -> tuple[EnginePort, LocalPort | None]:
+def port_to(engine: RemotePort | Engine) -> tuple[RemotePort, LocalPort | None]:
     """The port itself, or one to an engine in this process, which whoever made it advances."""
     if isinstance(engine, Engine):
         own = LocalPort(engine)
         return own, own
     return engine, None
-
-
-class LinkDirection(Protocol):
-    """One direction of a link: a `Channel` or a `Stream`."""
-
-    def send(self, payload: Any, now: float, size: int = 0) -> float | None:
-        """Put a packet on its way."""
-
-    def receive(self, now: float) -> tuple[Any, ...]:
-        """What has arrived."""
-
-    def next_deadline(self) -> float | None:
-        """When something happens next [s]."""
-
-    def in_flight(self) -> int:
-        """Packets on their way."""
 
 
 class MemoryTransport:
@@ -156,7 +119,7 @@ class MemoryTransport:
     """
 
     def __init__(
-        self, site: Site, forward: LinkDirection, backward: LinkDirection, *, lead: float = 0.0, most: int = 256
+        self, site: Site, forward: Direction[Any], backward: Direction[Any], *, lead: float = 0.0, most: int = 256
     ) -> None:
         self.port = RemotePort()
         self.servlet = site.servlet(lead=lead)

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, replace
 
 from interfaces.clients.playhead import Mode, PlayHead
-from interfaces.clients.ports import EnginePort, port_to
+from interfaces.clients.ports import RemotePort, port_to
 from interfaces.clients.viewer_sources import FrameSource, SegmentSource
 from interfaces.engine_server.forecasts import WINDOW
 from interfaces.engine_server.site import earliest
@@ -60,7 +60,7 @@ class Viewer:
 
     def __init__(
         self,
-        engine: EnginePort | Engine,
+        engine: RemotePort | Engine,
         *,
         rate: float = 50.0,
         form: ViewForm = ViewForm.SEGMENTS,
@@ -121,7 +121,7 @@ class Viewer:
     @property
     def timeline(self) -> Timeline | None:
         """The timeline as far as it has come; None before that, and in the forms of frames."""
-        return None if self.segments is None else self.segments.mirror.timeline
+        return None if self.segments is None else self.segments.timeline
 
     @property
     def mode(self) -> Mode:

@@ -1,4 +1,4 @@
-"""Where a viewer's frames come from: a copy of the timeline (`Mirror`), or frames that a servlet sends."""
+"""Where a viewer's frames come from: a copy of the timeline, or frames that a servlet sends."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import takewhile
-from typing import Protocol, TypeAlias, TypeVar
-
-from typing_extensions import override
+from typing import TypeAlias, TypeVar
 
 from interfaces.clients.observer import Observer
 from interfaces.clients.playhead import LiveEdge
-from interfaces.clients.ports import EnginePort
+from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.broadcast import status_of
 from interfaces.engine_server.forecasts import WINDOW, Forecasts
 from interfaces.engine_server.journal import AHEAD, PART, changed
@@ -44,15 +42,31 @@ from vrs.timeline import Timeline
 HELD = 64
 """Edits that came before the one that they build on, and parts of a history before those in front, at most."""
 
-Edited = tuple[Timeline, int | None]
-"""A timeline, and the command that made it."""
+BUFFERED = 256
+"""Frames at hand, at most."""
+
+NEAR = 0.6
+"""A frame is shown for a time of the play head this many of the viewer's periods away, or less."""
+
+LEAD = 0.02
+"""How much sooner than the slowest round trip demands a frame is asked for [s]."""
+
+SAME = 1e-9
+"""Times that differ by less [s] are the same."""
 
 
-class Mirror:
-    """Fetches the timeline so far, then follows its edits. What is lost, is asked for again."""
+Ahead: TypeAlias = Callable[[float], float | None]
+"""Where a play head will be in so many seconds [s], if nobody moves it."""
 
-    def __init__(self, port: EnginePort, *, resend: float) -> None:
-        self._port = port
+
+class SegmentSource:
+    """A copy of the timeline: fetched so far, then its edits followed; what is lost, is asked for again.
+
+    It's evaluated at any time, at any rate, without asking.
+    """
+
+    def __init__(self, port: RemotePort, *, resend: float, lead: float = 0.0) -> None:
+        self._port, self._lead = port, lead
         self._resend = interval_of(resend)
         self._follow = Follow(port.number(), ViewForm.SEGMENTS)
         self._fetching: list[PolynomialSegment] | None = None
@@ -60,7 +74,9 @@ class Mirror:
         self._held: dict[int, Change] = {}
         self._due = -math.inf
         self._behind = False
-        self._edited: list[Edited] = []
+        self._forecasts = Forecasts()
+        self._settled: list[FrameVerdict] = []
+        self.live = LiveEdge()
         self.scene: Scene | None = None
         """What it began with."""
         self.edit = 0
@@ -69,6 +85,16 @@ class Mirror:
         """The copy; None until the whole timeline so far has come."""
         self.past = -math.inf
         """Up to this time [s] the copy is what happened."""
+
+    @property
+    def delay(self) -> float:
+        """Nothing need be asked for [s]."""
+        return 0.0
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """Start and end of the timeline as far as it's known [s]."""
+        return None if self.timeline is None else (self.timeline.start, self.timeline.end)
 
     def receive(self, message: Reply, *, now: float) -> None:
         """Take what concerns the timeline."""
@@ -83,6 +109,9 @@ class Mirror:
                 self.past = max(self.past, message.past)
             else:
                 self._lack(now)
+        if isinstance(message, Pulse):
+            self.live.heard(message.now + self._lead, now=now)
+            self._settled += self._forecasts.settle(self.past)
 
     def _begin(self, scene: Scene, now: float) -> None:
         known = self.scene
@@ -141,7 +170,7 @@ class Mirror:
 
     def _advance_to(self, timeline: Timeline, edit: int, command_id: int | None) -> None:
         self.timeline, self.edit = timeline, edit
-        self._edited.append((timeline, command_id))
+        self._settled += self._forecasts.edited(timeline, lambda _: command_id)
         self._behind = False
         self._held = {base: change for base, change in self._held.items() if base >= edit}
 
@@ -166,150 +195,13 @@ class Mirror:
         if self._waits() and now >= self._due:
             self._ask(now)
 
-    def edited(self) -> tuple[Edited, ...]:
-        """The edits since the last call."""
-        edited, self._edited = tuple(self._edited), []
-        return edited
-
-    def next_deadline(self) -> float | None:
-        """When something is asked for again [s]; None when nothing is missing."""
-        return self._due if self._waits() else None
-
-    def _waits(self) -> bool:
-        return self.timeline is None or self._fetching is not None or self._behind
-
-
-BUFFERED = 256
-"""Frames at hand, at most."""
-
-NEAR = 0.6
-"""A frame is shown for a time of the play head this many of the viewer's periods away, or less."""
-
-LEAD = 0.02
-"""How much sooner than the slowest round trip demands a frame is asked for [s]."""
-
-SAME = 1e-9
-"""Times that differ by less [s] are the same."""
-
-
-Ahead: TypeAlias = Callable[[float], float | None]
-"""Where a play head will be in so many seconds [s], if nobody moves it."""
-
-
-class ViewerSource(Protocol):
-    """What a viewer needs of its source."""
-
-    live: LiveEdge
-
-    @property
-    def delay(self) -> float:
-        """How long a frame takes to come that is asked for [s]."""
-
-    @property
-    def scene(self) -> Scene | None:
-        """What there is to see; None before it's known."""
-
-    @property
-    def span(self) -> tuple[float, float] | None:
-        """Start and end of the timeline as far as it's known [s]."""
-
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Take a reply."""
-
-    def advance(self, *, now: float) -> None:
-        """Ask for what's missing."""
-
-    def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
-        """The frame for the place of the play head, under the viewer's number.
-
-        Args:
-            number: Number that the viewer gives it.
-            t: The place [s].
-            now: The user's time [s].
-            live: Whether the newest frame is wanted.
-            ahead: Where the play head will be, from now on [s] in so many seconds.
-            floor: The newest frame isn't wanted if it shows an earlier time than this [s].
-
-        Returns:
-            The frame; None where there's none, or none that is new.
-        """
-
-    def settled(self) -> tuple[FrameVerdict, ...]:
-        """What became of frames since the last call."""
-
-    def next_deadline(self) -> float | None:
-        """When something is to be done [s]."""
-
-    def close(self) -> None:
-        """Listen no more."""
-
-
-class SegmentSource(ViewerSource):
-    """Evaluates a copy of the timeline: any time, at any rate, without asking."""
-
-    def __init__(self, port: EnginePort, *, lead: float, resend: float) -> None:
-        self._mirror = Mirror(port, resend=resend)
-        self._lead = lead
-        self._forecasts = Forecasts()
-        self._settled: list[FrameVerdict] = []
-        self.live = LiveEdge()
-
-    @property
-    def delay(self) -> float:
-        """Nothing need be asked for [s]."""
-        return 0.0
-
-    @property
-    def mirror(self) -> Mirror:
-        """The copy."""
-        return self._mirror
-
-    @property
-    def scene(self) -> Scene | None:
-        """What it began with."""
-        return self._mirror.scene
-
-    @property
-    def span(self) -> tuple[float, float] | None:
-        """Start and end of the timeline [s]."""
-        timeline = self._mirror.timeline
-        return None if timeline is None else (timeline.start, timeline.end)
-
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Take a reply."""
-        self._mirror.receive(message, now=now)
-        if isinstance(message, Pulse):
-            self.live.heard(message.now + self._lead, now=now)
-            self._compare()
-            self._settled += self._forecasts.settle(self._mirror.past)
-
-    def advance(self, *, now: float) -> None:
-        """Ask for what's missing, and compare what was shown with new edits."""
-        self._mirror.advance(now=now)
-        self._compare()
-
-    def _compare(self) -> None:
-        for timeline, command_id in self._mirror.edited():
-            self._settled += self._forecasts.edited(timeline, lambda _, by=command_id: by)  # type: ignore[misc]
-
-    @override
-    def frame(
-        self,
-        number: int,
-        t: float,
-        *,
-        now: float,
-        live: bool,
-        ahead: Ahead,
-        floor: float,
-    ) -> Frame | None:
-        """The frame for a time; None before the timeline has come."""
-        timeline = self._mirror.timeline
-        if timeline is None:
+    def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:  # noqa: ARG002
+        """The frame for a time under the viewer's number; None before the timeline has come."""
+        if self.timeline is None:
             return None
-        q = frozen_array(timeline.sample(t))
-        status = self._forecasts.add(number, t, q, now=self._mirror.past)
-        return Frame(number, t, max(self._mirror.past, timeline.start), q, status)
+        q = frozen_array(self.timeline.sample(t))
+        status = self._forecasts.add(number, t, q, now=self.past)
+        return Frame(number, t, max(self.past, self.timeline.start), q, status)
 
     def settled(self) -> tuple[FrameVerdict, ...]:
         """What became of frames since the last call."""
@@ -317,8 +209,11 @@ class SegmentSource(ViewerSource):
         return settled
 
     def next_deadline(self) -> float | None:
-        """When something is asked for again [s]."""
-        return self._mirror.next_deadline()
+        """When something is asked for again [s]; None when nothing is missing."""
+        return self._due if self._waits() else None
+
+    def _waits(self) -> bool:
+        return self.timeline is None or self._fetching is not None or self._behind
 
     def close(self) -> None:
         """Nothing else listens."""
@@ -329,7 +224,7 @@ class FrameSource:
 
     def __init__(
         self,
-        port: EnginePort,
+        port: RemotePort,
         *,
         rate: float,
         resend: float,
@@ -450,7 +345,16 @@ class FrameSource:
                 self._settled.append(FrameVerdict(shown, frame.status, frame.falsified_by))
 
     def frame(self, number: int, t: float, *, now: float, live: bool, ahead: Ahead, floor: float) -> Frame | None:
-        """The frame nearest to a time, if it's near enough and not the last one; what comes next is asked for."""
+        """The frame nearest to a time, if it's near enough and not the last one; what comes next is asked for.
+
+        Args:
+            number: Number that the viewer gives it.
+            t: The place of the play head [s].
+            now: The user's time [s].
+            live: Whether the newest frame is wanted.
+            ahead: Where the play head will be.
+            floor: The newest frame isn't wanted if it shows an earlier time than this [s].
+        """
         if live and self._newest is not None:
             newest = self._newest
             if self._waited:

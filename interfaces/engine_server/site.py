@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal
 from interfaces.engine_server.servlet import Servlet
-from interfaces.messages import Order, Refusal
+from interfaces.messages import Order, Refusal, control
 from vrs.clock import ManualClock
 from vrs.commands import finite
 from vrs.engine import Engine
@@ -62,6 +63,23 @@ class Site:
     def servlet(self, *, lead: float = 0.0, admit: Callable[[Order], Refusal | None] | None = None) -> Servlet:
         """Make the server submodule of one more client, which finds the broadcasters that are there now."""
         return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters, admit=admit)
+
+    def look(self) -> int:
+        """Number of the newest edit."""
+        return self.journal.look()
+
+    def welcome(self, **facts: Any) -> control.Welcome:
+        """What a client of a server is told that is let in: the facts that every client is told, and these."""
+        model = self.engine.model
+        return control.Welcome(
+            protocol=control.PROTOCOL,
+            robot=model.name,
+            dof=model.limits.dof,
+            limits=model.limits,
+            poses=dict(model.poses),
+            rates=tuple(broadcaster.rate for broadcaster in self._broadcasters),
+            **facts,
+        )
 
     def time(self, now: float) -> float:
         """The engine's time [s] when the users' clock shows now [s]; moves a manual clock on to it.

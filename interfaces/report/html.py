@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from interfaces.clients.appearance import viewer_bundle
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.output import of_drives
 from interfaces.messages.recording import RunEvent
@@ -27,6 +26,7 @@ from interfaces.report.tables import FIGURES, card, figures, receipts, shown, ta
 from interfaces.runs.drive_run import DriveRun
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import TwinRun
+from interfaces.stream.meshcat.meshes import viewer_bundle
 
 
 def write_report(path: str | Path, run: TwinRun, summary: Mapping[str, Any]) -> None:

@@ -10,7 +10,7 @@ import json
 from collections.abc import AsyncIterator, Iterable, Mapping
 from functools import lru_cache
 from importlib import resources
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from fastapi import FastAPI
 from nicegui import Client, core, ui
@@ -122,24 +122,18 @@ class Station:
 
 def _boxes(panels: Iterable[Panel]) -> str:
     """The empty boxes that the panels' scripts fill."""
-    cards = dict.fromkeys(PanelPlace, "")
+    cards: dict[PanelPlace, str] = dict.fromkeys(get_args(PanelPlace), "")
     for panel in panels:
         inner = _box(f"panel-{panel.name}", f"panel panel-{panel.name}")
         cards[panel.place] += _box(f"card-{panel.name}", "card", inner)
-    side = _box("tabs", "tabs") + _box("tab-panels", "tab-panels", cards[PanelPlace.SIDE])
-    work = (
-        _box("pane-box", "pane-box", cards[PanelPlace.PANE])
-        + _box("splitter", "splitter")
-        + _box("side", "side", side)
-    )
-    header = f'<h1 class="name"><div>{TITLE}</div></h1>' + _box(
-        "bar-panels", "bar-panels", cards[PanelPlace.HEADER]
-    )
+    side = _box("tabs", "tabs") + _box("tab-panels", "tab-panels", cards["side"])
+    work = _box("pane-box", "pane-box", cards["pane"]) + _box("splitter", "splitter") + _box("side", "side", side)
+    header = f'<h1 class="name"><div>{TITLE}</div></h1>' + _box("bar-panels", "bar-panels", cards["header"])
     return (
         _box("bar", "bar", header)
         + _box("work", "work", work)
-        + _box("strip-box", "strip-box", cards[PanelPlace.STRIP])
-        + _box("nowhere", "nowhere", cards[PanelPlace.NOWHERE])
+        + _box("strip-box", "strip-box", cards["strip"])
+        + _box("nowhere", "nowhere", cards["nowhere"])
     )
 
 

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
 from vrs.errors import InvalidValueError
 
-
-class PanelPlace(enum.StrEnum):
-    """Where a panel stands."""
-
-    HEADER = "header"
-    """In the bar on top, always visible."""
-    PANE = "pane"
-    """Over the 3D view."""
-    SIDE = "side"
-    """A tab at the right."""
-    STRIP = "strip"
-    """Across the bottom."""
-    NOWHERE = "nowhere"
-    """A script without a place of its own."""
+PanelPlace: TypeAlias = Literal["header", "pane", "side", "strip", "nowhere"]
+"""Where a panel stands: in the bar on top, always visible; over the 3D view; as a tab at the right; across the
+bottom; or nowhere, as a script without a place of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,35 +34,35 @@ class Panel:
 
 
 PANELS: Final[tuple[Panel, ...]] = (
-    Panel("pane", "3D view", PanelPlace.PANE),
-    Panel("drag", "Dragging the tool", PanelPlace.NOWHERE),
-    Panel("link", "Connection", PanelPlace.HEADER),
-    Panel("control", "Control", PanelPlace.HEADER),
-    Panel("theme", "Light or dark", PanelPlace.HEADER),
-    Panel("stop", "Stop", PanelPlace.HEADER),
-    Panel("jog", "Jog", PanelPlace.SIDE, icon="open_with"),
-    Panel("receipts", "Receipts", PanelPlace.SIDE, icon="receipt_long"),
-    Panel("plots", "Plots", PanelPlace.SIDE, icon="show_chart"),
-    Panel("terminal", "Terminal", PanelPlace.SIDE, icon="terminal"),
-    Panel("network", "Link", PanelPlace.SIDE, icon="network_check"),
-    Panel("record", "Record", PanelPlace.SIDE, icon="fiber_manual_record"),
-    Panel("strip", "Timeline", PanelPlace.STRIP),
-    Panel("hints", "Hints", PanelPlace.NOWHERE),
+    Panel("pane", "3D view", "pane"),
+    Panel("drag", "Dragging the tool", "nowhere"),
+    Panel("link", "Connection", "header"),
+    Panel("control", "Control", "header"),
+    Panel("theme", "Light or dark", "header"),
+    Panel("stop", "Stop", "header"),
+    Panel("jog", "Jog", "side", icon="open_with"),
+    Panel("receipts", "Receipts", "side", icon="receipt_long"),
+    Panel("plots", "Plots", "side", icon="show_chart"),
+    Panel("terminal", "Terminal", "side", icon="terminal"),
+    Panel("network", "Link", "side", icon="network_check"),
+    Panel("record", "Record", "side", icon="fiber_manual_record"),
+    Panel("strip", "Timeline", "strip"),
+    Panel("hints", "Hints", "nowhere"),
 )
 """What the page has, in the order of its tabs and of the keyboard."""
 
 MOBILE_PANELS: Final[tuple[Panel, ...]] = (
-    Panel("floor", "3D view", PanelPlace.PANE),
-    Panel("link", "Connection", PanelPlace.HEADER),
-    Panel("control", "Control", PanelPlace.HEADER),
-    Panel("theme", "Light or dark", PanelPlace.HEADER),
-    Panel("stop", "Stop", PanelPlace.HEADER),
-    Panel("drive", "Drive", PanelPlace.SIDE, icon="gamepad"),
-    Panel("map", "Map", PanelPlace.SIDE, icon="map"),
-    Panel("jobs", "Jobs", PanelPlace.SIDE, icon="checklist"),
-    Panel("camera", "Camera", PanelPlace.SIDE, icon="videocam"),
-    Panel("deviation", "Plots", PanelPlace.SIDE, icon="show_chart"),
-    Panel("network", "Link", PanelPlace.SIDE, icon="network_check"),
-    Panel("hints", "Hints", PanelPlace.NOWHERE),
+    Panel("floor", "3D view", "pane"),
+    Panel("link", "Connection", "header"),
+    Panel("control", "Control", "header"),
+    Panel("theme", "Light or dark", "header"),
+    Panel("stop", "Stop", "header"),
+    Panel("drive", "Drive", "side", icon="gamepad"),
+    Panel("map", "Map", "side", icon="map"),
+    Panel("jobs", "Jobs", "side", icon="checklist"),
+    Panel("camera", "Camera", "side", icon="videocam"),
+    Panel("deviation", "Plots", "side", icon="show_chart"),
+    Panel("network", "Link", "side", icon="network_check"),
+    Panel("hints", "Hints", "nowhere"),
 )
 """What a mobile robot's page has."""

@@ -8,7 +8,7 @@ import json
 import secrets
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -54,30 +54,31 @@ class _RecordAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class RecordingFacts:
-    """What a recording says of the robot, and who is told when it fails."""
-
-    offset: str
-    """How far the robot plays behind, as it was asked for."""
-    link_loss: str
-    """What it does when messages stay away."""
-    failed: Callable[[str], None]
-
-
 class Recordings:
     """Joins the operator's site, the directory and the pages. Enter `running` in the loop that serves."""
 
-    def __init__(self, operator: LiveOperator, shelf: Shelf, access: Access, facts: RecordingFacts) -> None:
+    def __init__(
+        self,
+        operator: LiveOperator,
+        shelf: Shelf,
+        access: Access,
+        *,
+        offset: str,
+        link_loss: str,
+        failed: Callable[[str], None],
+    ) -> None:
         """Wait for pages.
 
         Args:
             operator: Whose doings are recorded.
             shelf: Where recordings are put.
             access: Who may do what: viewers look, replay and take copies, operators record.
-            facts: What is said in a recording.
+            offset: What a recording says of how far the robot plays behind, as it was asked for.
+            link_loss: What it says of what the robot does when messages stay away.
+            failed: Is told why a recording failed.
         """
-        self._operator, self._shelf, self._access, self._facts = operator, shelf, access, facts
+        self._operator, self._shelf, self._access = operator, shelf, access
+        self._recording = partial(LiveRecording, offset=offset, link_loss=link_loss, failed=failed, over=False)
 
         def allowed(token: str | None) -> bool:
             return not access.refusal(Role.VIEWER, token)
@@ -194,10 +195,7 @@ class Recordings:
             RecordingError: If the file can't be made.
         """
         path = self._shelf.place(name)
-        facts = self._facts
-        await self._operator.begin_recording(
-            LiveRecording(path, facts.offset, facts.link_loss, facts.failed, over=False)
-        )
+        await self._operator.begin_recording(self._recording(path))
 
     def _ticket(self, name: str) -> str:
         """A word by which a recording can be fetched once, soon; it opens nothing else."""

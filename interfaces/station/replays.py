@@ -7,7 +7,7 @@ import contextlib
 import json
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, TypeAlias
 
 from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.websockets import WebSocket
@@ -38,9 +38,8 @@ WAITING: Final = 64
 """Play-backs that are asked for at once, opened or not."""
 
 
-class _Key(NamedTuple):
-    names: tuple[str, ...]
-    align: Align
+_Key: TypeAlias = tuple[tuple[str, ...], Align]
+"""Names of the recordings, and how they lie in time."""
 
 
 class _SharedReplay:
@@ -145,7 +144,7 @@ class Replays:
             InvalidValueError: If a recording isn't there, or too many are asked for.
         """
         key = _key(query)
-        for name in key.names:
+        for name in key[0]:
             self._shelf.path(name)
         replay = self.replays.get(key)
         if replay is None:
@@ -173,8 +172,8 @@ class Replays:
     async def _play(self, replay: _SharedReplay) -> None:
         """Open it, play it while somebody looks, close it."""
         try:
-            paths = [self._shelf.path(name) for name in replay.key.names]
-            async with _opened(paths, replay.key.align, self._shelf.robot) as playback:
+            names, align = replay.key
+            async with _opened([self._shelf.path(name) for name in names], align, self._shelf.robot) as playback:
                 await self._show(replay, playback)
         except VrsError as error:
             replay.say("failed", str(error))
@@ -215,7 +214,7 @@ def _key(query: Mapping[str, str]) -> _Key:
     names = tuple(query[letter] for letter in "ab" if letter in query)
     if not names:
         raise InvalidValueError("recordings", "none", "one or two of those that are listed")
-    return _Key(names, Align(one_of("align", query.get("align", Align.START), Align)))
+    return names, Align(one_of("align", query.get("align", Align.START), Align))
 
 
 @contextlib.asynccontextmanager

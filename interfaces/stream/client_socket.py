@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
+from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.site import earliest
 from interfaces.messages.control import Problem, ProtocolError
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
@@ -47,64 +48,79 @@ class ClientPart(Protocol):
         """Begin anew: the server knows nothing any more."""
 
 
-class Worker:
-    """A thread with an event loop."""
-
-    def __init__(self) -> None:
-        self.loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name="vrs-client", daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        asyncio.set_event_loop(self.loop)
-        self.loop.run_forever()
-
-    def close(self) -> None:
-        """End it."""
-        self.loop.call_soon_threadsafe(self.loop.stop)
-        self._thread.join(timeout=5.0)
-        self.loop.close()
+C = TypeVar("C", bound=ClientCore)
+T = TypeVar("T")
 
 
-class Line:
-    """One client's connections to a server, one after the other.
+class Line(Generic[C]):
+    """One client's connections to a server, one after the other, for those that use it from other threads."""
 
-    `changed` is the lock of all that the client has, and told of whenever something has come.
-    """
-
-    def __init__(
-        self, url: str, core: ClientCore, clock: Clock, changed: threading.Condition, worker: Worker
-    ) -> None:
-        """Begin to connect.
+    def __init__(self, url: str, core: C, clock: Clock, loop: asyncio.AbstractEventLoop, timeout: float) -> None:
+        """Connect, and wait until the server has said welcome.
 
         Args:
             url: Of the server's WebSocket, `ws://HOST:PORT/ws`.
             core: The client.
             clock: Local time.
-            changed: Lock of the client and its parts.
-            worker: Where it runs.
+            loop: Where it runs, in a thread of its own.
+            timeout: How long to wait [s].
+
+        Raises:
+            UnreachableError: If the server doesn't say so within the time, or refuses.
         """
-        self.url, self.core, self.clock, self.changed = url, core, clock, changed
+        self.url, self.core, self.clock = url, core, clock
+        self.changed = threading.Condition(threading.RLock())
+        """Lock of all that the client has, and told of whenever something has come."""
         self.parts: list[ClientPart] = []
         self.failure = ""
         """Why the last connection didn't come about or ended."""
-        self._worker = worker
+        self._loop = loop
         self._sessions = 0
         self._wake = asyncio.Event()
         self._closing = False
-        self._done = asyncio.run_coroutine_threadsafe(self._keep(), worker.loop)
+        self._done = asyncio.run_coroutine_threadsafe(self._keep(), loop)
+        try:
+            self._wait_open(timeout)
+        except UnreachableError:
+            self.close()
+            raise
+
+    @property
+    def port(self) -> RemotePort:
+        """By which the four interfaces reach the engine."""
+        return self.core.port
+
+    def now(self) -> float:
+        """Session time [s]."""
+        with self.changed:
+            t = self.core.time(self.clock.now())
+        assert t is not None
+        return t
+
+    def do(self, action: Callable[[float], T]) -> T:
+        """Call something with the session time now [s], under the lock; what it sends, is sent."""
+        with self.changed:
+            result = action(self.now())
+        self.wake()
+        return result
+
+    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
+        """Wait, until something is so or the time [s] is over; whether it is."""
+        with self.changed:
+            return self.changed.wait_for(ready, timeout) if timeout > 0 else ready()
+
+    def add(self, part: ClientPart) -> None:
+        """Move a part on from now on."""
+        with self.changed:
+            self.parts.append(part)
+        self.wake()
 
     def wake(self) -> None:
         """Something is to be sent."""
         with contextlib.suppress(RuntimeError):
-            self._worker.loop.call_soon_threadsafe(self._wake.set)
+            self._loop.call_soon_threadsafe(self._wake.set)
 
-    def wait_open(self, timeout: float) -> None:
-        """Wait until the server has said welcome.
-
-        Raises:
-            UnreachableError: If it doesn't within the time [s], or refuses.
-        """
+    def _wait_open(self, timeout: float) -> None:
         core = self.core
         with self.changed:
             self.changed.wait_for(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable
 from functools import partial
 from types import TracebackType
-from typing import Generic, Self, TypeVar
+from typing import Generic, Self
 
 from interfaces.clients.designer import Issued
-from interfaces.clients.ports import EnginePort
 from interfaces.clients.viewer import ShownFrame
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
@@ -30,57 +30,12 @@ from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import Forecast, JobList, ListCommand
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
-from interfaces.stream.client_socket import ClientPart, Line, UnreachableError, Worker
+from interfaces.stream.client_socket import C, Line, UnreachableError
 from interfaces.stream.codec import Encoding
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from robots.onboard.journey import Goal
 from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop
-
-C = TypeVar("C", bound=ClientCore)
-T = TypeVar("T")
-
-
-class ClientSession(Generic[C]):
-    """A client on a line, for those that use it from other threads."""
-
-    def __init__(self, url: str, core: C, clock: WallClock, worker: Worker, timeout: float) -> None:
-        self.core, self._clock = core, clock
-        self.changed = threading.Condition(threading.RLock())
-        self.line = Line(url, core, clock, self.changed, worker)
-        try:
-            self.line.wait_open(timeout)
-        except UnreachableError:
-            self.line.close()
-            raise
-
-    @property
-    def port(self) -> EnginePort:
-        """By which the four interfaces reach the engine."""
-        return self.core.port
-
-    def now(self) -> float:
-        """Session time [s]."""
-        with self.changed:
-            t = self.core.time(self._clock.now())
-        assert t is not None
-        return t
-
-    def local(self) -> float:
-        """The local time [s]."""
-        return self._clock.now()
-
-    def do(self, action: Callable[[float], T]) -> T:
-        """Call something with the session time now [s], under the lock; what it sends, is sent."""
-        with self.changed:
-            result = action(self.now())
-        self.line.wake()
-        return result
-
-    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
-        """Wait, until something is so or the time [s] is over; whether it is."""
-        with self.changed:
-            return self.changed.wait_for(ready, timeout) if timeout > 0 else ready()
 
 
 class RobotConnection(Generic[C]):
@@ -115,24 +70,20 @@ class RobotConnection(Generic[C]):
         self._url, self._token, self._name, self._encoding = _address(url), token, name, encoding
         self._timeout = timeout
         self._clock = WallClock()
-        self._worker = Worker()
-        self._sessions: list[ClientSession[C]] = []
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="vrs-client", daemon=True)
+        self._thread.start()
+        self._sessions: list[Line[C]] = []
         try:
             self._session = self._open(Role(role))
         except UnreachableError:
-            self._worker.close()
+            self._end_thread()
             raise
 
-    def _open(self, role: Role) -> ClientSession[C]:
+    def _open(self, role: Role) -> Line[C]:
         core = self._make(role=role, name=self._name, token=self._token, encoding=self._encoding)
-        self._sessions.append(ClientSession(self._url, core, self._clock, self._worker, self._timeout))
+        self._sessions.append(Line(self._url, core, self._clock, self._loop, self._timeout))
         return self._sessions[-1]
-
-    @staticmethod
-    def _add(session: ClientSession[C], part: ClientPart) -> None:
-        with session.changed:
-            session.line.parts.append(part)
-        session.line.wake()
 
     def __enter__(self) -> Self:
         return self
@@ -147,12 +98,17 @@ class RobotConnection(Generic[C]):
         if self._session.core.epoch:
             self.release(wait=1.0)
         for session in self._sessions:
-            session.line.close()
+            session.close()
         self._sessions.clear()
-        self._worker.close()
+        self._end_thread()
 
-    def _end(self, session: ClientSession[C]) -> None:
-        session.line.close()
+    def _end_thread(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(timeout=5.0)
+        self._loop.close()
+
+    def _end(self, session: Line[C]) -> None:
+        session.close()
         if session in self._sessions:
             self._sessions.remove(session)
 
@@ -321,8 +277,8 @@ class Connection(RobotConnection[ClientCore]):
         """Asks for positions."""
         self.supervisor = RemoteSupervisor(self.designer, self.observer)
         """Both."""
-        self._add(self._session, self.designer)
-        self._add(self._session, self.observer)
+        self._session.add(self.designer)
+        self._session.add(self.observer)
 
     def viewer(
         self,
@@ -347,7 +303,7 @@ class Connection(RobotConnection[ClientCore]):
         session = self._open(Role.VIEWER)
         end = partial(self._end, session)
         viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), delay=delay, show=show, end=end)
-        self._add(session, viewer)
+        session.add(viewer)
         return viewer
 
     @property
@@ -379,7 +335,7 @@ class MobileConnection(RobotConnection[MobileCore]):
         """Connect; see `interfaces.connect_mobile`."""
         super().__init__(MobileCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
         self._designer = RemoteDesigner(self._session)
-        self._add(self._session, self._designer)
+        self._session.add(self._designer)
 
     def drive(self, v: float, w: float, *, wait: float = 0.0) -> Issued:
         """Drive for a moment; who doesn't say so again stops. It ends what the robot does by itself.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode, Request
 from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
 from interfaces.messages.mobile import MobileWelcome
 from interfaces.stream.codec import Value
-from interfaces.stream.hosted import Greeting
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.driving.operator import HOLDS
 from vrs.commands import DriveCommand, Stop
@@ -22,13 +22,6 @@ OUTBOX = 256
 _NOTHING = "a mobile robot's postures are told to every client: there's nothing to follow, ask or want"
 _COMMANDS = "a mobile robot is driven and stopped: drive and stop are what can be ordered"
 _AT_ONCE = "a live drive begins as it comes: leave out execute_at"
-
-
-class _NoEdits:
-    """A site of which nothing is followed."""
-
-    def look(self) -> int:
-        return 0
 
 
 class DriveSite:
@@ -45,7 +38,6 @@ class DriveSite:
         self._operator, self._model, self._room = operator, model, room
         self.robot = model.name
         self.broadcasters = ()
-        self.journal = _NoEdits()
 
     def broadcast(self, rate: float) -> object:
         """Nothing is broadcast but postures.
@@ -54,6 +46,10 @@ class DriveSite:
             InvalidValueError: Always.
         """
         raise InvalidValueError("rate", rate, "none: a mobile robot has no frames")
+
+    def look(self) -> int:
+        """No edit: nothing is followed."""
+        return 0
 
     def servlet(self, *, admit: Callable[[Order], Refusal | None]) -> DriveServlet:
         """Make what serves one more client."""
@@ -70,8 +66,8 @@ class DriveSite:
         """Return None: it waits for nothing of its own."""
         return None
 
-    def welcome(self, greeting: Greeting) -> MobileWelcome:
-        """What a client is told that is let in, beside what every client is told."""
+    def welcome(self, **facts: Any) -> MobileWelcome:
+        """What a client is told that is let in: the facts that every client is told, and these."""
         model = self._model
         return MobileWelcome(
             protocol=PROTOCOL,
@@ -80,7 +76,7 @@ class DriveSite:
             period=model.period,
             holds=HOLDS,
             room=self._room,
-            **greeting._asdict(),
+            **facts,
         )
 
 

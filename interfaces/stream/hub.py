@@ -7,18 +7,17 @@ import math
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
-from interfaces.engine_server.site import earliest
+from interfaces.engine_server.site import Site, earliest
 from interfaces.messages import control
 from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role, may_send
 from interfaces.messages.drive_sites import RobotTask
 from interfaces.messages.mobile import TaskOrder, Tasks
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, SharedEncoder
-from interfaces.stream.hosted import Greeter, Greeting, Hosted, arms
 from interfaces.stream.leasing import LeasedRobot, Leasing
 from interfaces.stream.limits import Allowances, Bucket, ClientLimits
 from interfaces.stream.session import (
@@ -34,6 +33,9 @@ from interfaces.stream.session import (
 )
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
+
+if TYPE_CHECKING:
+    from interfaces.stream.driving import DriveSite
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
@@ -109,14 +111,14 @@ class Hub:
 
     def __init__(
         self,
-        site: Hosted,
+        site: Site | DriveSite,
         lease: Lease,
         access: Access,
         robot: LeasedRobot,
         *,
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
-        welcome: Greeter | None = None,
+        welcome: Callable[..., Welcome] | None = None,
         workers: Workers | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
@@ -129,7 +131,7 @@ class Hub:
             robot: What the lease does to the robot.
             config: How to serve.
             emulation: The way to the robot, where one is emulated.
-            welcome: Makes what a client of another robot than an arm is told.
+            welcome: Makes what a client is told that is let in; the site's unless given.
             workers: What lets the robot do something by itself, where it can.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
@@ -138,7 +140,7 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        self._greeting = arms(site) if welcome is None else welcome
+        self._greeting = site.welcome if welcome is None else welcome
         self._leasing = Leasing(lease, robot, self.limits.sharers)
         self._random = random_bytes
         if not site.broadcasters:
@@ -160,7 +162,7 @@ class Hub:
         self._allowances = Allowances(self.limits, 0.0)
         self._surveyed: tuple[float, int, Network | None] = (-math.inf, 0, None)
         self._seats: dict[str, SessionState] = {}
-        self._edit = site.journal.look()
+        self._edit = site.look()
         self._sweep = -math.inf
         self._now = self._t = -math.inf
 
@@ -283,7 +285,7 @@ class Hub:
         self.site.advance(now=now)
         if self._newest is not self.state and now >= self._state_due:
             self.state, self._state_due = self._newest, now + 1.0 / self.config.state_rate
-        edit, before = self.site.journal.look(), self._edit
+        edit, before = self.site.look(), self._edit
         self._edit = edit
         if edit != before:
             for session in self._sessions:
@@ -341,9 +343,11 @@ class Hub:
         return seat
 
     def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcome:
-        config, timeout = self.config, self._leasing.timeout
-        facts = seat.key, seat.role, now, self.lease_for(seat), resumed, config.instance, config.server, timeout
-        return self._greeting(Greeting(*facts))
+        config = self.config
+        return self._greeting(
+            session=seat.key, role=seat.role, now=now, lease=self.lease_for(seat), resumed=resumed,
+            instance=config.instance, server=config.server, lease_timeout=self._leasing.timeout,
+        )  # fmt: skip
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
         """How the way to the robot is, worked out now and then for all who ask; None where none is emulated."""

@@ -86,9 +86,11 @@ COMMON = 0.2
 class Allowance:
     """Processor time and bytes that come at a rate; what's spent is known afterwards: waiting makes up for it."""
 
-    __slots__ = ("_at", "_burst", "_rates", "_spent")
+    __slots__ = ("_at", "_burst", "_rates", "_shared", "_spent")
 
-    def __init__(self, work: float, volume: float, now: float, *, burst: float = AT_ONCE) -> None:
+    def __init__(
+        self, work: float, volume: float, now: float, *, burst: float = AT_ONCE, shared: tuple[Allowance, ...] = ()
+    ) -> None:
         """Begin with nothing spent.
 
         Args:
@@ -96,8 +98,9 @@ class Allowance:
             volume: Bytes a second.
             now: [s].
             burst: What comes in this time may be spent at once [s].
+            shared: What is spent with it, and waited for: others' allowances, too.
         """
-        self._rates, self._burst, self._at = (work, volume), burst, now
+        self._rates, self._burst, self._at, self._shared = (work, volume), burst, now, shared
         self._spent = [0.0, 0.0]
 
     def spend(self, work: float, size: float, *, now: float) -> None:
@@ -105,12 +108,14 @@ class Allowance:
         past, self._at = max(now - self._at, 0.0), max(now, self._at)
         for kind, (rate, taken) in enumerate(zip(self._rates, (work, size), strict=True)):
             self._spent[kind] = max(self._spent[kind] - rate * past, 0.0) + taken
+        for allowance in self._shared:
+            allowance.spend(work, size, now=now)
 
     def wait(self, *, now: float) -> float:
         """How long until something may be spent again [s]; 0 for now."""
         past = max(now - self._at, 0.0)
         debts = (spent / rate - past - self._burst for spent, rate in zip(self._spent, self._rates, strict=True))
-        return max(0.0, *debts)
+        return max(0.0, *debts, *(allowance.wait(now=now) for allowance in self._shared))
 
 
 class Allowances:
@@ -122,41 +127,22 @@ class Allowances:
         self._others = self._of(limits.others, now, COMMON)
         self._addresses: dict[str, tuple[Allowance, int]] = {}
 
-    def _of(self, times: float, now: float, burst: float = AT_ONCE) -> Allowance:
-        return Allowance(times * self._limits.work, times * self._limits.volume, now, burst=burst)
+    def _of(
+        self, times: float, now: float, burst: float = AT_ONCE, shared: tuple[Allowance, ...] = ()
+    ) -> Allowance:
+        return Allowance(times * self._limits.work, times * self._limits.volume, now, burst=burst, shared=shared)
 
-    def join(self, address: str, *, now: float) -> Spending:
-        """Give a client of an address what it may spend."""
+    def join(self, address: str, *, now: float) -> tuple[Allowance, Allowance]:
+        """Give a client of an address what it may spend: while it doesn't command, and while it does."""
         shared, clients = self._addresses.get(address) or (self._of(self._limits.address, now, COMMON), 0)
         self._addresses[address] = shared, clients + 1
-        return Spending(self._of(1.0, now), self._of(self._limits.commands, now), (shared, self._others))
+        return self._of(1.0, now, shared=(shared, self._others)), self._of(self._limits.commands, now)
 
     def leave(self, address: str) -> None:
         """Take it back."""
         shared, clients = self._addresses.pop(address)
         if clients > 1:
             self._addresses[address] = shared, clients - 1
-
-
-class Spending:
-    """What one client may spend."""
-
-    __slots__ = ("_commanding", "_own", "_shared")
-
-    def __init__(self, own: Allowance, commanding: Allowance, shared: tuple[Allowance, ...]) -> None:
-        self._own, self._commanding, self._shared = own, commanding, shared
-
-    def _counts(self, commands: bool) -> tuple[Allowance, ...]:
-        return (self._commanding,) if commands else (self._own, *self._shared)
-
-    def spend(self, work: float, size: float, *, commands: bool, now: float) -> None:
-        """Take processor time [s] and bytes, for one that commands or doesn't."""
-        for allowance in self._counts(commands):
-            allowance.spend(work, size, now=now)
-
-    def wait(self, *, commands: bool, now: float) -> float:
-        """How long it has to wait before its next message is looked at [s]."""
-        return max(allowance.wait(now=now) for allowance in self._counts(commands))
 
 
 C = TypeVar("C", bound=Hashable)

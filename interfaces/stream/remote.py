@@ -4,38 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import Any
 
 from interfaces.clients.designer import Designer, Issued
 from interfaces.clients.observer import Observation, Observer
 from interfaces.clients.playhead import Mode
-from interfaces.clients.ports import EnginePort
 from interfaces.clients.viewer import ShownFrame, Viewer
 from interfaces.messages import Scene, ViewForm
+from interfaces.stream.client_socket import Line
 from vrs.commands import Command
 from vrs.timeline import Timeline
-
-T = TypeVar("T")
-
-
-class RemoteSession(Protocol):
-    """What the four need of their connection."""
-
-    @property
-    def port(self) -> EnginePort:
-        """By which they reach the engine."""
-
-    def do(self, action: Callable[[float], T]) -> T:
-        """Call something with the session time now [s], under the lock; what it sends, is sent."""
-
-    def wait(self, ready: Callable[[], bool], timeout: float) -> bool:
-        """Wait, until something is so or the time [s] is over; whether it is."""
 
 
 class RemoteDesigner:
     """A `Designer` under a lock. Commands that have no answer when a session is lost are refused as unknown."""
 
-    def __init__(self, session: RemoteSession) -> None:
+    def __init__(self, session: Line[Any]) -> None:
         self._session = session
         self._designer = Designer(session.port)
 
@@ -98,7 +82,7 @@ class RemoteDesigner:
 class RemoteObserver:
     """An `Observer` under a lock."""
 
-    def __init__(self, session: RemoteSession) -> None:
+    def __init__(self, session: Line[Any]) -> None:
         self._session = session
         self._observer = Observer(session.port)
 
@@ -161,7 +145,7 @@ class RemoteViewer:
 
     def __init__(
         self,
-        session: RemoteSession,
+        session: Line[Any],
         *,
         rate: float,
         form: ViewForm,

@@ -309,30 +309,6 @@ REFUSED = "this Host or Origin isn't allowed here; the server's option --reached
 """Said to what doesn't name this server."""
 
 
-class Guard:
-    """Lets in only what names this server exactly, and comes from no other's page."""
-
-    def __init__(self, app: ASGIApp, allowed: frozenset[str]) -> None:
-        """Stand before an application.
-
-        Args:
-            app: The application.
-            allowed: From `access.hosts`.
-        """
-        self._app, self._allowed = app, allowed
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, or answer 403."""
-        if scope["type"] in {"http", "websocket"}:
-            given = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
-            host = [value for name, value in given if name == b"host"]
-            origin = [value for name, value in given if name == b"origin"]
-            if not (check_host(host, self._allowed) and check_origin(origin, self._allowed)):
-                await _refuse(scope, receive, send)
-                return
-        await self._app(scope, receive, send)
-
-
 async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await receive()
@@ -342,10 +318,22 @@ async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
 
 
 def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp:
-    """An application of routes, behind a `Guard`.
+    """An application of routes that lets in only what names this server exactly, and comes from no other's page.
 
     Args:
         routes: What it answers.
         allowed: From `access.hosts`.
     """
-    return Guard(Starlette(routes=list(routes)), allowed)
+    app = Starlette(routes=list(routes))
+
+    async def guarded(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] in {"http", "websocket"}:
+            given = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
+            host = [value for name, value in given if name == b"host"]
+            origin = [value for name, value in given if name == b"origin"]
+            if not (check_host(host, allowed) and check_origin(origin, allowed)):
+                await _refuse(scope, receive, send)
+                return
+        await app(scope, receive, send)
+
+    return guarded

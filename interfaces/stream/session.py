@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from typing import Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
-from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Request, Want, control
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Want, control
 from interfaces.messages.control import (
     Impair,
     Network,
@@ -20,7 +20,11 @@ from interfaces.messages.control import (
 )
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.stream.codec import Encoding, SharedEncoder, Value, decode, sent_by
-from interfaces.stream.limits import Bucket, ClientLimits, Outbox, Spending
+from interfaces.stream.limits import Allowance, Bucket, ClientLimits, Outbox
+
+if TYPE_CHECKING:
+    from interfaces.engine_server.servlet import Servlet
+    from interfaces.stream.driving import DriveServlet
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
@@ -51,22 +55,6 @@ News: TypeAlias = Tasks | Seen | Plan
 """What every client is told when it changes: of each kind the newest counts."""
 
 
-class Served(Protocol):
-    """What serves one client's orders and questions; times are the robot's site's [s]."""
-
-    def receive(self, message: Request, *, now: float) -> None:
-        """Take a message of the client."""
-
-    def advance(self, *, now: float) -> tuple[Value, ...]:
-        """What is to be sent to it."""
-
-    def next_deadline(self) -> float | None:
-        """When there's something to be sent; −∞ for at once."""
-
-    def close(self) -> None:
-        """The client is gone for good."""
-
-
 class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
@@ -74,7 +62,7 @@ class SessionState:
 
     def __init__(self, key: str, name: str, role: Role) -> None:
         self.key, self.name, self.role = key, name, role
-        self.servlet: Served
+        self.servlet: Servlet | DriveServlet
         self.session: HubSession | None = None
         self.left = 0.0
         """When its connection was lost [s]."""
@@ -123,13 +111,15 @@ class HubApi(Protocol):
 class HubSession:
     """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
 
-    def __init__(self, desk: HubApi, encoding: Encoding, spending: Spending, *, now: float) -> None:
+    def __init__(
+        self, desk: HubApi, encoding: Encoding, spending: tuple[Allowance, Allowance], *, now: float
+    ) -> None:
         """Wait for `Hello`.
 
         Args:
             desk: The hub.
             encoding: How its messages are written.
-            spending: What it may cost.
+            spending: What it may cost while it doesn't command, and while it does.
             now: Session time [s].
         """
         self._spending, self._told = spending, 0
@@ -204,12 +194,12 @@ class HubSession:
             now: Session time [s].
         """
         total = self._outbox.total
-        self._spending.spend(work, total - self._told, commands=self.commands, now=now)
+        self._spending[self.commands].spend(work, total - self._told, now=now)
         self._told = total
 
     def wait(self, *, now: float) -> float:
         """How long nothing more of the client is to be looked at [s]; 0 for at once."""
-        return 0.0 if self.closing is not None else self._spending.wait(commands=self.commands, now=now)
+        return 0.0 if self.closing is not None else self._spending[self.commands].wait(now=now)
 
     def _hear(self, data: bytes | str, now: float) -> None:
         if self.closing is not None:

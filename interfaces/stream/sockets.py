@@ -8,10 +8,9 @@ import resource
 import socket
 from asyncio.transports import BaseTransport, Transport
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterable
 from dataclasses import dataclass
-from enum import Enum, auto
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, cast
 
 import uvicorn
 from starlette.types import Scope
@@ -80,15 +79,8 @@ class SocketLimits:
     """A connection is cut off when it hasn't taken HIGH − LOW bytes for so long [s], 0.01 to 60."""
 
 
-class _Phase(Enum):
-    """What a connection with HTTP is at."""
-
-    HEADER = auto()
-    """A request's header is to come."""
-    BODY = auto()
-    """Its body is."""
-    ANSWER = auto()
-    """It's answered."""
+_Phase: TypeAlias = Literal["header", "body", "answer"]
+"""What a connection with HTTP is at: a request's header is to come, its body is, or it's answered."""
 
 
 class Turns:
@@ -187,7 +179,7 @@ class BoundedHttp(_Bounded, H11Protocol):
         """Take a connection."""
         super().connection_made(transport)
         transport.set_write_buffer_limits(HIGH, LOW)
-        self._phase = _Phase.HEADER
+        self._phase: _Phase = "header"
         self._unread = b""
         self._enter(self._state.limits.request)
 
@@ -217,7 +209,7 @@ class BoundedHttp(_Bounded, H11Protocol):
         super().handle_events()
         if self.cycle is not before:
             self._state.strangers.renew(self)
-            self._phase = _Phase.ANSWER
+            self._phase = "answer"
             self._begin_phase()
         self._look()
 
@@ -233,14 +225,13 @@ class BoundedHttp(_Bounded, H11Protocol):
 
     def _look(self) -> None:
         """Begin the next phase, if it's another one: what drips doesn't make one longer."""
+        phase: _Phase = "answer"
         limits, seconds = self._state.limits, float("inf")
         if self.cycle is None or self.cycle.response_complete:
-            phase, seconds = _Phase.HEADER, limits.request
+            phase, seconds = "header", limits.request
         elif self.cycle.more_body:
-            phase, seconds = _Phase.BODY, limits.body
-        else:
-            phase = _Phase.ANSWER
-        if phase is not self._phase:
+            phase, seconds = "body", limits.body
+        if phase != self._phase:
             self._phase = phase
             self._begin_phase(seconds)
 
@@ -409,14 +400,6 @@ def let_stay(scope: Scope, *, known: bool) -> None:
         connection.let_stay(known=known)
 
 
-class _Server(uvicorn.Server):
-    """Leaves signals to whoever runs it."""
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        yield
-
-
 def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
     """Make a listening socket with small buffers, which its connections inherit.
 
@@ -477,7 +460,9 @@ async def serve(
         timeout_graceful_shutdown=1,
         backlog=BACKLOG,
     )
-    server = _Server(config)
+    server = uvicorn.Server(config)
+    # Signals are left to whoever runs it.
+    server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
     looking = asyncio.create_task(_cut_off_overdue(state))
     task = asyncio.create_task(server.serve(sockets=[listening]))

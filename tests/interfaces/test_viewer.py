@@ -296,7 +296,7 @@ def test_over_any_link_the_copy_becomes_the_timeline(seed, loss, duplicate, edit
     t = np.linspace(-1, 40, 1500)
     for _ in range(40):
         joined.run(1.0)
-        if viewer.timeline is not None and viewer.segments.mirror.edit == joined.site.journal.number:
+        if viewer.timeline is not None and viewer.segments.edit == joined.site.journal.number:
             break
     assert np.abs(viewer.timeline.sample(t) - joined.engine.joints(t)).max() < 1e-9
     assert [s.command_id for s in viewer.timeline.segments] == [

@@ -1,14 +1,18 @@
-"""Triangle meshes as MeshCat takes them: smooth where a surface is, sharp at its edges."""
+"""MeshCat's viewer, and triangle meshes as it takes them: smooth where a surface is, sharp at its edges."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
+from vrs.errors import FormatError
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -16,6 +20,25 @@ if TYPE_CHECKING:
 
 CREASE = math.cos(math.radians(35.0))
 """Cosine of the angle between faces [rad] beyond which the edge between them stays sharp."""
+
+
+@lru_cache(maxsize=1)
+def viewer_bundle() -> tuple[str, str]:
+    """Find MeshCat's viewer and its licence texts without importing MeshCat.
+
+    Raises:
+        FormatError: If it isn't installed or has no bundle.
+    """
+    spec = find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise FormatError("meshcat", "not installed; every 3D view is its viewer bundle")
+    root = Path(spec.origin).parent / "viewer"
+    bundle = root / "dist" / "main.min.js"
+    if not bundle.is_file():
+        raise FormatError(str(bundle), "missing; reinstall meshcat")
+    texts = [root / "LICENSE", root / "dist" / "main.min.js.LICENSE.txt"]
+    licences = "\n\n".join(text.read_text(encoding="utf-8").strip() for text in texts if text.is_file())
+    return bundle.read_text(encoding="utf-8"), licences
 
 
 class ShadedMesh(NamedTuple):
@@ -31,20 +54,16 @@ class ShadedMesh(NamedTuple):
     """Indices of vertices, (m, 3)."""
 
 
-class Bodies(NamedTuple):
-    """What a robot looks like."""
-
-    meshes: tuple[ShadedMesh, ...]
-    """A mesh for the base and for each link, in its frame; none for a robot without shapes."""
-    floor: float
-    """Lowest point of the base in its frame [m]; 0 for a robot without shapes."""
+Bodies: TypeAlias = tuple[tuple[ShadedMesh, ...], float]
+"""What a robot looks like: a mesh for the base and for each link, in its frame, and the lowest point of the base in
+its frame [m]; none and 0 for a robot without shapes."""
 
 
 def bodies(robot: Robot) -> Bodies:
     """Make the meshes of a robot; the first time that takes a second, most of it to load trimesh."""
     shapes = robot.shapes()
     floor = min((float(shape.vertices[:, 2].min()) for shape in shapes[:1]), default=0.0)
-    return Bodies(tuple(shaded(shape) for shape in shapes), floor)
+    return tuple(shaded(shape) for shape in shapes), floor
 
 
 def shaded(shape: LinkShape) -> ShadedMesh:

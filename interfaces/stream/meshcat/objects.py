@@ -178,47 +178,37 @@ def group(path: str, parts: Sequence[ObjectPart], data: Json | None = None) -> J
     return lowered
 
 
-class Shaded:
-    """A mesh with normals, which MeshCat's own geometry has no place for."""
+class Lowered:
+    """A geometry as three.js describes it, for what MeshCat has no class for."""
 
-    def __init__(self, mesh: ShadedMesh, *, coloured: bool) -> None:
-        self._mesh, self._coloured = mesh, coloured
+    def __init__(self, described: Json) -> None:
+        self._described = described
         self.uuid = ""
 
     def lower_in_object(self, data: Json) -> None:
         """Add itself to the object's geometries."""
-        mesh = self._mesh
-        plain = g.TriangularMeshGeometry(mesh.vertices, mesh.faces)
-        plain.uuid = self.uuid
-        plain.lower_in_object(data)
-        attributes = data["geometries"][-1]["data"]["attributes"]
-        attributes["normal"] = g.pack_numpy_array(mesh.normals.T)
-        if self._coloured:
-            attributes["color"] = {**g.pack_numpy_array(mesh.colours.T), "normalized": True}
+        data["geometries"].append(self._described | {"uuid": self.uuid})
 
 
-class Sheet:
-    """A rectangle in its own xy plane with room for a picture, which MeshCat has no class for."""
-
-    def __init__(self, width: float, height: float) -> None:
-        self._width, self._height = width, height
-        self.uuid = ""
-
-    def lower_in_object(self, data: Json) -> None:
-        """Add itself to the object's geometries."""
-        sheet = {"uuid": self.uuid, "type": "PlaneGeometry", "width": self._width, "height": self._height}
-        data["geometries"].append(sheet)
+def _shaded(mesh: ShadedMesh, *, coloured: bool) -> Lowered:
+    """A mesh with normals."""
+    described = g.TriangularMeshGeometry(mesh.vertices, mesh.faces).lower({})
+    attributes = described["data"]["attributes"]
+    attributes["normal"] = g.pack_numpy_array(mesh.normals.T)
+    if coloured:
+        attributes["color"] = {**g.pack_numpy_array(mesh.colours.T), "normalized": True}
+    return Lowered(described)
 
 
 def solid(path: str, mesh: ShadedMesh) -> Json:
     """Lower a link of the real robot, in its own colours."""
     material = g.MeshPhongMaterial(vertexColors=True, side=FRONT, shininess=25, specular=0x222222, reflectivity=1.0)
-    return group(path, [ObjectPart(Shaded(mesh, coloured=True), material)])
+    return group(path, [ObjectPart(_shaded(mesh, coloured=True), material)])
 
 
 def plain(path: str, mesh: ShadedMesh, colour: int) -> Json:
     """Lower what has one colour, whatever light falls on it."""
-    return group(path, [ObjectPart(Shaded(mesh, coloured=False), g.MeshBasicMaterial(color=colour, side=FRONT))])
+    return group(path, [ObjectPart(_shaded(mesh, coloured=False), g.MeshBasicMaterial(color=colour, side=FRONT))])
 
 
 def ghost(path: str, mesh: ShadedMesh) -> Json:
@@ -227,7 +217,7 @@ def ghost(path: str, mesh: ShadedMesh) -> Json:
     Depth comes first, so that only the nearest surface shows; both are pushed back, so that the ghost yields to the
     solid robot where the two coincide.
     """
-    shape = Shaded(mesh, coloured=False)
+    shape = _shaded(mesh, coloured=False)
     back = {"polygonOffset": True, "polygonOffsetFactor": 1.5, "polygonOffsetUnits": 6}
     depth = g.MeshBasicMaterial(side=FRONT, transparent=True, colorWrite=False, **back)
     skin = g.MeshPhongMaterial(color=GHOST, opacity=0.46, side=FRONT, depthWrite=False, **back)
@@ -307,7 +297,8 @@ def sign(path: str, png: bytes, size: tuple[float, float], X: Array) -> Json:
     texture = g.ImageTexture(image)
     image.uuid, texture.uuid = f"{path}:image", f"{path}:texture"
     turned = X @ _STANDING
-    part = ObjectPart(Sheet(*size), g.MeshBasicMaterial(map=texture, side=FRONT), matrix=turned.T.ravel().tolist())
+    sheet = Lowered({"uuid": "", "type": "PlaneGeometry", "width": size[0], "height": size[1]})
+    part = ObjectPart(sheet, g.MeshBasicMaterial(map=texture, side=FRONT), matrix=turned.T.ravel().tolist())
     return group(path, [part])
 
 

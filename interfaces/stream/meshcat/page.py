@@ -15,7 +15,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from interfaces.clients.appearance import viewer_bundle
+from interfaces.stream.meshcat.meshes import viewer_bundle
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.server import KeptFile
 from interfaces.stream.sockets import let_stay

@@ -112,16 +112,16 @@ class TwinScene(Nodes):
             looks: From `bodies` of the scene's robot, which takes its time and may be asked for in a thread.
         """
         assert not self._poses
-        objects, meshes = self._objects, looks.meshes
+        objects, (meshes, floor) = self._objects, looks
         rest = np.asarray(self._links(self._start))
         rods: list[Array | None] = []
         if self._robot.is_base:
             self._room = DrawnRoom(self, self._start, *self._surroundings)
         else:
             model = self._robot.arm
-            self.put_property(ROOT, "box", _box(model, looks.floor))
+            self.put_property(ROOT, "box", _box(model, floor))
             # Below the floor by a hair: no stripes where a foot stands on it.
-            self.put_transform("/Grid", _at(0.0, 0.0, looks.floor - 0.001))
+            self.put_transform("/Grid", _at(0.0, 0.0, floor - 0.001))
             self.put_property("/Axes", "visible", False)
             if not meshes:
                 rods = [None, *(_rod(model, i) for i in range(1, len(rest)))]

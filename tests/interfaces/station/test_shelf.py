@@ -128,7 +128,7 @@ def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
             assert served.replay_for({"a": "whole.mcap", "align": "start"}) is first
             assert first.page.playback.tracks[0].recording.path == kept / "whole.mcap"
             other, _ = await opened(served, b="whole.mcap", align="timeline")
-            assert other.key.align is Align.TIMELINE
+            assert other.key[1] is Align.TIMELINE
             full, _ = await opened(served, align="began")
             assert (full.task, standing(full)["kind"]) == (None, "failed")
             assert "open already" in standing(full)["text"]

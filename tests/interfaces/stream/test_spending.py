@@ -41,11 +41,11 @@ def test_a_crowd_waits_together_and_who_commands_for_nobody() -> None:
     now, worked = 0.0, 0.0
     while now < 10.0:
         for one in crowd:
-            if one.wait(commands=False, now=now) == 0.0:
-                one.spend(1e-3, 100.0, commands=False, now=now)
+            if one[False].wait(now=now) == 0.0:
+                one[False].spend(1e-3, 100.0, now=now)
                 worked += 1e-3
-        assert commander.wait(commands=True, now=now) == 0.0
-        assert other.wait(commands=False, now=now) == 0.0, "another address isn't held up"
+        assert commander[True].wait(now=now) == 0.0
+        assert other[False].wait(now=now) == 0.0, "another address isn't held up"
         now += 1e-2
     assert 0.4 < worked < 0.05 * 10.0 + 0.05 * 0.2 + 30e-3 + 0.1
 

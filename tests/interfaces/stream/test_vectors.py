@@ -12,7 +12,7 @@ import pytest
 import umsgpack
 
 from interfaces.clients.ports import RemotePort
-from interfaces.clients.viewer_sources import Mirror
+from interfaces.clients.viewer_sources import SegmentSource
 from interfaces.stream import Encoding, decode, encode
 from interfaces.stream.codec import KINDS, TYPES
 from tests.interfaces.stream import make_vectors
@@ -71,7 +71,7 @@ def test_segments_are_worth_what_the_file_says() -> None:
 
 def test_a_reader_of_the_stream_has_the_engines_joints() -> None:
     port = RemotePort()
-    mirror = Mirror(port, resend=1.0)
+    mirror = SegmentSource(port, resend=1.0)
     mirror.advance(now=0.0)
     asked = []
     for step in VECTORS["stream"]["steps"]:
