@@ -118,7 +118,6 @@ class Hub:
         *,
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
-        welcome: Callable[..., Welcome] | None = None,
         workers: Workers | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
@@ -131,7 +130,6 @@ class Hub:
             robot: What the lease does to the robot.
             config: How to serve.
             emulation: The way to the robot, where one is emulated.
-            welcome: Makes what a client is told that is let in; the site's unless given.
             workers: What lets the robot do something by itself, where it can.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
@@ -140,7 +138,6 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        self._greeting = site.welcome if welcome is None else welcome
         self._leasing = Leasing(lease, robot, self.limits.sharers)
         self._random = random_bytes
         if not site.broadcasters:
@@ -344,7 +341,7 @@ class Hub:
 
     def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcome:
         config = self.config
-        return self._greeting(
+        return self.site.welcome(
             session=seat.key, role=seat.role, now=now, lease=self.lease_for(seat), resumed=resumed,
             instance=config.instance, server=config.server, lease_timeout=self._leasing.timeout,
         )  # fmt: skip

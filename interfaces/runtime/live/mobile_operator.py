@@ -102,10 +102,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
         hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
         self.site = DriveSite(self.operator, model, room=config.room.name)
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, lambda _, __: self._turning.soon())
-        self.hub = Hub(
-            self.site, lease, access, self, config=hub, emulation=self.emulation, welcome=self.site.welcome,
-            workers=self,
-        )  # fmt: skip
+        self.hub = Hub(self.site, lease, access, self, config=hub, emulation=self.emulation, workers=self)
         self.desk = TaskDesk(self.operator, config.room, model, self.hub.tell, config.jobs, config.arm)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self.drawing = MobileDrawing(config.base, start, config.room, grid_of(config.room, start))
