@@ -15,10 +15,12 @@ import pytest
 
 from interfaces.cli.main import exit_status
 from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce
+from interfaces.lab.claims import Results
 from interfaces.lab.doulgeri import agreement, broadcasting, causality, delays, dragging, encoding, jitter, segments
 from interfaces.lab.output import rich_tables, write
 from interfaces.lab.runner import joined
 from interfaces.lab.statistics import bootstrap, median
+from tests.interfaces.lab.test_doulgeri_claims import but
 from vrs import Timeline
 from vrs.errors import InvalidValueError
 
@@ -138,7 +140,8 @@ class TestDoulgeri:
             assert ET.fromstring(figure.svg).tag.endswith("svg")
 
     def test_fig_1(self):
-        before, after, t_exec = segments.example()
+        seen = segments.example()
+        before, after, t_exec = seen.before, seen.after, seen.t_exec
         assert [segments.degree(s) for s in segments.moving(before)] == [2, 1, 2]
         assert [segments.degree(s) for s in segments.moving(after)] == [2, 1, 2, 1, 2]
         assert segments.moving(after)[2].start == t_exec
@@ -146,7 +149,7 @@ class TestDoulgeri:
 
     def test_a_jump_is_seen(self):
         """The timeline's own check lets jumps of velocity pass."""
-        _, after, _ = segments.example()
+        after = segments.example().after
         torn = list(after.segments)
         bent = torn[-1].coefficients.copy()
         bent[1] += 0.01
@@ -158,13 +161,13 @@ class TestDoulgeri:
     @pytest.mark.parametrize("case", list(delays.SETTINGS))
     def test_figs_4_to_6_in_a_run(self, case):
         setting = delays.SETTINGS[case]
-        seen, sent = delays.run(setting, 5, 6.0)
+        seen = delays.run(setting, 5, 6.0)
         assert np.abs(np.array(seen.lateness) - setting.lateness).max() < 1e-8
         assert seen.ages[0] == pytest.approx(setting.age, abs=1e-8)
         assert seen.shown <= setting.age + 1.0 / delays.RATE + 1e-8
         assert (seen.falsified > 0) == (setting.lead > 0)
         assert seen.falsified == pytest.approx(seen.foretold, abs=0.01)
-        assert len(sent.commands) == len(seen.lateness) > 0
+        assert len(seen.commands) == len(seen.lateness) > 0
 
     def test_frames_further_ahead_are_falsified_more_often(self):
         shares = delays.leads(1, 10.0)
@@ -172,7 +175,7 @@ class TestDoulgeri:
         assert 0 < shares[0] < shares[-1] < 1
 
     def test_foretold_counts_what_lies_in_the_lead(self):
-        frames = [(t, t + 0.5, t) for t in (0.0, 0.3, 0.6, 1.0)]
+        frames = [Results(made_at=t, t=t + 0.5) for t in (0.0, 0.3, 0.6, 1.0)]
         assert delays.foretold(frames, np.array([0.7])) == 0.5
         assert delays.foretold(frames, np.array([])) == 0.0
         assert delays.foretold([], np.array([0.7])) == 0.0
@@ -184,7 +187,7 @@ class TestDoulgeri:
         assert [claim.expected for claim in lateness] == [0.3, 0.0, 0.0, 0.5]
         assert all(claim.holds for claim in lateness)
         wrong = delays.SETTINGS["0"]._replace(D=0.01)
-        seen, _ = delays.run(delays.SETTINGS["0"], 5, 4.0)
+        seen = delays.run(delays.SETTINGS["0"], 5, 4.0)
         assert not any(claim.holds for claim in delays.delay_claims(SMALL, wrong, [seen])[:2])
 
     def test_causality_is_told_rightly_by_each_clock(self):
@@ -216,8 +219,8 @@ class TestDoulgeri:
         result = jitter.work(study, "mon@0.2")
         found = jitter.conclude(study, (result,) * len(jitter.CASES))
         assert len(found.tables[0].rows) == 2 * len(jitter.CASES)
-        worst = tuple(s._replace(aside=0.01, bursts=1, limits=1.1) for s in result.adaptive)
-        bad = result._replace(adaptive=worst)
+        worst = tuple(but(s, aside=0.01, bursts=1, limits=1.1) for s in result.adaptive)
+        bad = but(result, adaptive=worst)
         worse = jitter.conclude(study, (bad, *(result,) * (len(jitter.CASES) - 1)))
         assert [claim.holds for claim in worse.claims[:4]] == [False, False, True, False]
 
@@ -225,8 +228,8 @@ class TestDoulgeri:
         study = Study(seed=1, runs=2, length=2.0)
         result = jitter.work(study, "mon@0.2")
         one = result.adaptive[0]
-        pair = tuple(one._replace(mean=x, time_difference=x) for x in (0.0, 1.0))
-        level = result._replace(adaptive=pair, fixed=(one._replace(mean=1.5, time_difference=1.5),) * 2)
+        pair = tuple(but(one, mean=x, time_difference=x) for x in (0.0, 1.0))
+        level = but(result, adaptive=pair, fixed=(but(one, mean=1.5, time_difference=1.5),) * 2)
         found = jitter.conclude(study, (level,) * len(jitter.CASES))
         less = [claim for claim in found.claims if "adaptive less fixed" in claim.claim]
         # Of two seeds it's the range: each counts once.
@@ -241,7 +244,10 @@ class TestDoulgeri:
         assert encoding.measure("moves", 1, 6.0).segments < sizes.frames
 
     def test_encoding_concludes(self):
-        sizes = encoding.Sizes(100.0, 60.0, 400.0, 50.0, 1e-3, 0.0, 400.0, 500.0, 600.0, 1e-6)
+        sizes = Results(
+            frames=100.0, frames_single=60.0, segments=400.0, commands=50.0, between=1e-3, rebuilt=0.0,
+            compact=400.0, compact_each=500.0, absolute=600.0, compact_error=1e-6,
+        )  # fmt: skip
         found = encoding.conclude(SMALL, ([sizes] * 2,) * 3)
         assert [claim.holds for claim in found.claims[:5]] == [False, True, True, True, True]
 
@@ -251,7 +257,7 @@ class TestDoulgeri:
     def test_timelines_that_never_agree_are_said_so(self):
         seen = agreement.talk(1, 4.0, agreement.Conditions(), None)
         assert seen.agreed <= 0.1
-        apart = seen._replace(agreed=np.inf)
+        apart = but(seen, agreed=np.inf)
         found = agreement.conclude(SMALL, ([apart] * 2, [apart] * 2, [seen] * 2, [seen] * 2))
         holds = {claim.claim: claim.holds for claim in found.claims if "agree to 1e-9" in claim.claim}
         assert list(holds.values()) == [False, False, True, True]

@@ -212,7 +212,7 @@ def test_the_laser_feeds_the_twins_estimator_and_their_attribution() -> None:
     assert off["laser"] < 0.02
     assert off["odometry"] > 3 * off["laser"]
     parts = attributed(replace(case, position="laser", reality=wandering, room="berths", length=4.0))
-    assert all(sum(one.parts) + one.residual == pytest.approx(one.total) for one in parts)
+    assert all(sum(part for _, part in one.parts) + one.residual == pytest.approx(one.total) for one in parts)
 
 
 def test_places_that_look_alike_are_told_from_those_that_do_not() -> None:

@@ -94,12 +94,13 @@ def test_what_few_runs_say_is_called_what_it_is() -> None:
 def test_the_laboratory_says_what_its_intervals_are(runs: int, said: str) -> None:
     rows = [_row(name, seed) for name in ("I", "II") for seed in range(runs)]
     first, second = grouped(rows)
-    verdict = paired(first, second, "path_error_max")
-    assert verdict is not None
+    found = paired(first, second, "path_error_max")
+    assert found is not None
+    _, verdict = found
     # All runs differ alike, but three of them are no proof.
-    assert verdict.verdict == ("unclear" if runs < 5 else "below")
-    found = summary(rows, {})
-    level = found["groups"][0]["median"]["path_error_max"].get("level", 0.95)
+    assert verdict == ("unclear" if runs < 5 else "below")
+    written = summary(rows, {})
+    level = written["groups"][0]["median"]["path_error_max"].get("level", 0.95)
     assert level == {3: None, 5: 0.9375, 12: 0.95}[runs]
     title = str(rich_table(rows).title)
     assert said in title

@@ -79,7 +79,7 @@ def test_who_isnt_admitted_drives_nothing() -> None:
 @pytest.fixture
 def hub() -> Hub:
     site = DriveSite(met().operator, MODEL, room="Empty room")
-    return Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), welcome=site.welcome)
+    return Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()))
 
 
 def said(session: HubSession, *messages: dict[str, Any], now: float = 5.0) -> list[dict[str, Any]]:
@@ -141,9 +141,7 @@ class Workers:
 
 def test_only_who_has_control_lets_the_robot_do_something_and_all_are_told() -> None:
     site, workers = DriveSite(met().operator, MODEL), Workers()
-    hub = Hub(
-        site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), welcome=site.welcome, workers=workers
-    )
+    hub = Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), workers=workers)
     ada, bob = hub.open(Encoding.JSON, now=5.0), hub.open(Encoding.JSON, now=5.0)
     said(ada, HELLO)
     said(bob, HELLO | {"role": "viewer"})
