@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
@@ -174,7 +175,7 @@ class Recording:
                     found[drop.topic] = max(drop.count, found.get(drop.topic, 0))
         return found
 
-    @property
+    @cached_property
     def robot(self) -> Robot:
         """The robot that it's of.
 
@@ -187,7 +188,7 @@ class Recording:
         name = begin.drive.body if own and begin.drive is not None else begin.robot
         robot = self._robot
         if (robot is None or robot.name != name) and name in names():
-            robot = self._robot = load(name)
+            robot = load(name)
         if robot is None or robot.name != name:
             raise FormatError(
                 str(self.path), f"of a robot that isn't known here: {name!r}; --robot says where it is"
@@ -197,7 +198,7 @@ class Recording:
             raise FormatError(str(self.path), f"of a {name!r} with {len(begin.q)} numbers to say where it is")
         return robot
 
-    @property
+    @cached_property
     def model(self) -> Any:
         """The robot's model: a `RobotModel`, or a `MobileBase` with the period of its run.
 
@@ -207,7 +208,7 @@ class Recording:
         drive = self.session.drive
         return self.robot.arm if drive is None else replace(self.robot.base, period=drive.period)
 
-    @property
+    @cached_property
     def prismatic(self) -> Collection[int]:
         """Joints that are, from 0; none where the robot has none, or isn't known."""
         try:

@@ -107,7 +107,7 @@ def test_a_robot_with_other_limits_makes_something_else_and_the_first_is_named(t
     with open_recording(tmp_path / "run.mcap") as recording:
         assert rerun(recording).identical
         other = puma560.model(limits=replace(MODEL.limits, qdd_max=0.999999 * MODEL.limits.qdd_max))
-        monkeypatch.setattr(type(recording), "model", other)
+        monkeypatch.setattr(recording, "model", other)
         again = rerun(recording)
     assert not again.identical
     assert again.difference.startswith("command 1 at 0.100000 s ")
