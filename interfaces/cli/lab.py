@@ -12,8 +12,7 @@ import typer
 from interfaces.cli.demo import prepare
 from interfaces.cli.options import PROFILES
 from interfaces.cli.reproduce import measured, show
-from interfaces.runs.drive_run import BARE
-from robots.robot import USUAL_BASE
+from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:

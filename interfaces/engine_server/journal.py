@@ -7,10 +7,9 @@ from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby, islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from interfaces.messages import Change, History
-from interfaces.messages.recording import ChangeEntry
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
@@ -18,6 +17,9 @@ from vrs.ledger import Receipt, Status
 from vrs.segment import HOLD, Piece
 from vrs.timeline import BaseTimeline, Timeline
 from vrs.tree import Leaf
+
+if TYPE_CHECKING:
+    from interfaces.messages.recording import ChangeEntry
 
 PART = 64
 """Segments of one message of a history: of six joints and a usual degree some 10 kB."""

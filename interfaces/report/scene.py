@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from interfaces.runs.twin_run import TwinRun
 from interfaces.station.chain import screws
+from interfaces.stream.meshcat.meshes import rod_of
 from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
@@ -84,18 +85,14 @@ def rods(model: RobotModel) -> tuple[LinkShape, ...]:
     """What an arm without shapes is drawn as: a knob a link, a rod from the one before where that's constant."""
     from robots.solids import Builder, hull
 
-    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
     corners = _THICK * np.array(list(product((-1.0, 1.0), repeat=3)))
     found = []
     for i in range(model.limits.dof + 1):
         build = Builder(f"link {i}", (0.62, 0.64, 0.67))
         build.add(hull(corners))
-        if i:
-            one, other = (
-                (np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span))
-            )
-            if np.allclose(one, other, atol=1e-9) and np.linalg.norm(one) > _THICK:
-                build.add(hull(np.vstack([0.4 * corners, one + 0.4 * corners])))
+        before = rod_of(model, i) if i else None
+        if before is not None and np.linalg.norm(before) > _THICK:
+            build.add(hull(np.vstack([0.4 * corners, before + 0.4 * corners])))
         found.append(build.shape())
     return tuple(found)
 

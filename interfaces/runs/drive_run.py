@@ -15,13 +15,11 @@ from robots.bullet.rooms import Room
 from robots.ipr.chassis import MobileReality
 from robots.ipr.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
-from robots.robot import USUAL_BASE, Robot, load
+from robots.robot import BARE, USUAL_BASE, Robot, load
 from vrs.checks import one_of, validated, within
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array
 
-BARE = "bare"
-"""Name of the usual mobile robot with its bare kinematic body."""
 DriveLink: TypeAlias = Link[ArcPacket, ArchitectureReport]
 """What is between both sites."""
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from robots.robot import Robot
 from vrs.errors import FormatError
-from vrs.model import Array
+from vrs.model import Array, RobotModel
 
 if TYPE_CHECKING:
     from robots.solids import LinkShape
@@ -57,6 +57,13 @@ class ShadedMesh(NamedTuple):
 Bodies: TypeAlias = tuple[tuple[ShadedMesh, ...], float]
 """What a robot looks like: a mesh for the base and for each link, in its frame, and the lowest point of the base in
 its frame [m]; none and 0 for a robot without shapes."""
+
+
+def rod_of(model: RobotModel, i: int) -> Array | None:
+    """Origin of link i − 1 in link i's frame [m], (3,); None where that isn't constant."""
+    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
+    one, other = ((np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span)))
+    return one if np.allclose(one, other, atol=1e-9) else None
 
 
 def bodies(robot: Robot) -> Bodies:

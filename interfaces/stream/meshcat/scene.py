@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece
-from interfaces.stream.meshcat.meshes import Bodies
+from interfaces.stream.meshcat.meshes import Bodies, rod_of
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.stream.meshcat.room import DrawnRoom
 from robots.robot import Display, Robot
@@ -124,7 +124,7 @@ class TwinScene(Nodes):
             self.put_transform("/Grid", _at(0.0, 0.0, floor - 0.001))
             self.put_property("/Axes", "visible", False)
             if not meshes:
-                rods = [None, *(_rod(model, i) for i in range(1, len(rest)))]
+                rods = [None, *(rod_of(model, i) for i in range(1, len(rest)))]
         self._traced = bool(rods)
         for twin in COLOURS:
             for i, mesh in enumerate(meshes):
@@ -284,13 +284,6 @@ def _at(x: float, y: float, z: float) -> Array:
     X = np.eye(4)
     X[:3, 3] = x, y, z
     return X
-
-
-def _rod(model: RobotModel, i: int) -> Array | None:
-    """Origin of link i − 1 in link i's frame [m], (3,); None where that isn't constant."""
-    low, span = model.limits.q_min, model.limits.q_max - model.limits.q_min
-    one, other = ((np.linalg.inv(X[i]) @ X[i - 1])[:3, 3] for X in model.links(low + np.outer((0.4, 0.6), span)))
-    return one if np.allclose(one, other, atol=1e-9) else None
 
 
 def _box(model: RobotModel, floor: float) -> list[list[float]]:
