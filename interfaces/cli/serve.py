@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -235,8 +235,7 @@ def serve(
     if not val_files.is_dir():
         raise InvalidValueError("val-files", str(val_files), "a directory")
     access = access_for(host, token_file, free=OPEN)
-    own = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    doors = _Doors(host, port, allowed, val_port, val_files, own, until_eof)
+    doors = _Doors(host, port, allowed, val_port, val_files, until_eof)
     uvloop.run(
         _serve(
             robot,
@@ -275,8 +274,6 @@ class _Doors:
     val_port: int | None
     """Of the monitor; None for none."""
     val_files: Path
-    own_token: str | None = field(repr=False)
-    """By which the monitor is an operator."""
     until_eof: bool
 
 
@@ -331,9 +328,10 @@ async def _serve(
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
+        from interfaces.stream.local import LocalClient
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageTerminalServer
-        from interfaces.val2.rooms import HOST, ServedVal
+        from interfaces.val2.rooms import HOST, served_room
         from interfaces.val2.tcp import TcpTerminalServer
         from robots.onboard.lease import LeaseState
 
@@ -347,9 +345,9 @@ async def _serve(
         panels = tuple(panel for panel in PANELS if speaks_val(arm) or panel.name != "terminal")
         station = Station(described(model, operator.scene.tool), panels=panels)
         shown = Address(host, port)
-        near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
-        val = ServedVal(f"ws://{near}/ws", doors.own_token, doors.val_files, software())
-        terminals = PageTerminalServer(val.enter, access).route
+        client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
+        val = served_room(client, operator.operator, doors.val_files, software())
+        terminals = PageTerminalServer(val, access).route
         recordings = Recordings(
             operator, Shelf(shelved.directory, arm), access,
             offset=shelved.offset, link_loss=shelved.link_loss, failed=_recording_failed,
@@ -360,7 +358,6 @@ async def _serve(
         await stack.enter_async_context(sockets.serve(app, listening))
         await stack.enter_async_context(operator.running())
         await stack.enter_async_context(recordings.running())
-        await stack.enter_async_context(val.running())
         keep_quiet()
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
         stack.callback(tidying.cancel)
@@ -369,7 +366,8 @@ async def _serve(
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
-            val_door = TcpTerminalServer(await val.enter(), val_access)
+            await val.ready()
+            val_door = TcpTerminalServer(val, val_access)
             await stack.enter_async_context(val_door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:

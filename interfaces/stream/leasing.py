@@ -185,7 +185,10 @@ class Leasing:
         return refusal
 
     def turn(self, now: float) -> None:
-        """Stop the robot if the lease has ended."""
+        """Stop the robot if the lease has ended; that of a holder in this process needs no beats."""
+        epoch = self._lease.epoch
+        if self.holder is not None and self.holder.local and epoch is not None:
+            self._lease.heard(epoch, now=now)
         ended = self._lease.advance(now=now)
         if ended is not None:
             self.holder, self._ended = None, ended.why

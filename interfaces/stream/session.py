@@ -58,10 +58,10 @@ News: TypeAlias = Tasks | Seen | Plan
 class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
-    __slots__ = ("key", "left", "name", "role", "servlet", "session")
+    __slots__ = ("key", "left", "local", "name", "role", "servlet", "session")
 
-    def __init__(self, key: str, name: str, role: Role) -> None:
-        self.key, self.name, self.role = key, name, role
+    def __init__(self, key: str, name: str, role: Role, *, local: bool = False) -> None:
+        self.key, self.name, self.role, self.local = key, name, role, local
         self.servlet: Servlet | DriveServlet
         self.session: HubSession | None = None
         self.left = 0.0

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from collections.abc import MutableMapping
+from collections.abc import Iterable, MutableMapping
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from interfaces.clients.designer import Issued
 from interfaces.messages import RefusalCode
 from interfaces.teleop.halt import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
@@ -31,11 +32,12 @@ from interfaces.val2.motion.places import (
     shifted,
     with_word,
 )
-from interfaces.val2.motion.robot import CommandOutcome, RobotPort
+from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
+from vrs.ledger import Receipt
 from vrs.model import Array
 
 _POLL: Final = 0.01
@@ -51,6 +53,8 @@ _ELSEWHERE: Final = 1e-5
 """Joints of an end that differ by more from the destination [rad]."""
 _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
+_LISTED: Final = 256
+"""Newest commands that are looked through for what isn't over."""
 
 
 class Arm(SettingsInForce):
@@ -123,7 +127,7 @@ class Arm(SettingsInForce):
 
     def real(self, *, now: float) -> Where | None:
         """Where the other twin was measured last; None where there's none."""
-        q = self.robot.real(now=now)
+        q = self.robot.other.q
         return None if q is None else self._frames.where(q, self._hand.opening(now))
 
     def past(self, t: float, *, now: float) -> Where:
@@ -201,7 +205,7 @@ class Arm(SettingsInForce):
         """
         if self._awaited is None or (outcome := self.robot.outcome(self._awaited, now=now)) is None:
             return
-        receipt, why = outcome.receipt, self.robot.halt_reason()
+        receipt, why = outcome.receipt, self.robot.other.halted
         if receipt is None or receipt.q is None or receipt.undone:
             self._awaited = None
             return
@@ -257,7 +261,7 @@ class Arm(SettingsInForce):
 
     def _nulled(self, now: float) -> bool:
         """Whether the other twin is there, where a motion was to end so."""
-        q = self.robot.real(now=now) if self._last_settings.nulling and self._dry is None else None
+        q = self.robot.other.q if self._last_settings.nulling and self._dry is None else None
         if q is None or now >= self._end() + _NULL_PATIENCE:
             return True
         allowed = (_FINE if self._last_settings.fine else _COARSE) * self._last_settings.tolerance / 100.0
@@ -500,7 +504,9 @@ class Arm(SettingsInForce):
         """TIMELINE: number, begin, end and destination of what is scheduled."""
         self._update(now)
         lines = []
-        for receipt in self.robot.scheduled(now=now):
+        newest = self.robot.newest
+        outcomes = (self.robot.outcome(n, now=now) for n in range(max(newest - _LISTED, 0) + 1, newest + 1))
+        for receipt in _standing((o.receipt for o in outcomes if o is not None and o.receipt is not None), now):
             q = receipt.q
             joints = "" if q is None else self._spelled(q)
             lines.append(
@@ -587,7 +593,7 @@ class Arm(SettingsInForce):
         self._alterations.set(None)
 
 
-def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
+def _refusal(outcome: Issued, straight: bool) -> ValError:
     """What a refusal is in VAL's words."""
     if outcome.code is RefusalCode.OVERRULED:
         return ValError("Motion interrupted", TAKEN)
@@ -601,3 +607,23 @@ def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
             "Straight line not possible", in_millimetres(outcome.reason.removeprefix("no straight line: "))
         )
     return location_error(outcome.reason)
+
+
+def _standing(receipts: Iterable[Receipt], now: float) -> tuple[Receipt, ...]:
+    """Those that are to be carried out and aren't over at a time [s], in the order of their beginning."""
+    known = {receipt.command_id: receipt for receipt in receipts if receipt.end is not None and not receipt.undone}
+    chosen = []
+    for receipt in known.values():
+        by = known.get(receipt.superseded_by or 0)
+        # One that the next begins before it's over gives way to that; anything else drops it.
+        if by is not None and by.q is not None and receipt.q is not None:
+            after = known.get(by.superseded_by or 0, by)
+            begins = min(by.execute_at or 0.0, after.execute_at or 0.0)
+            lasting = replace(receipt, end=begins)
+        elif receipt.superseded_by is None:
+            lasting = receipt
+        else:
+            continue
+        if (lasting.end or 0.0) > now:
+            chosen.append(lasting)
+    return tuple(sorted(chosen, key=lambda receipt: (receipt.execute_at or 0.0, receipt.command_id)))
