@@ -23,7 +23,7 @@ from interfaces.messages.jobs import (
     Progress,
 )
 from interfaces.messages.mobile import Plan, Seen, Tasks
-from interfaces.stream.session import News
+from interfaces.stream.codec import News
 from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.halt import HaltCause
 from robots.base import MobileBase

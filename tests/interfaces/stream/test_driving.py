@@ -15,8 +15,7 @@ from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
 from interfaces.stream.driving import DriveServlet, DriveSite
-from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.session import HubSession
+from interfaces.stream.hub import Hub, HubConfig, HubSession
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease
@@ -87,7 +86,7 @@ def said(session: HubSession, *messages: dict[str, Any], now: float = 5.0) -> li
     """What a client hears that says something."""
     for message in messages:
         session.receive(json.dumps(message), now=now)
-    session.desk.advance(now=now)  # type: ignore[attr-defined]
+    session.hub.advance(now=now)
     return [json.loads(data) for data in session.advance(now=now)]
 
 
@@ -143,7 +142,7 @@ def test_a_client_keeps_the_newest_of_each_kind(hub: Hub) -> None:
     for number in (1, 2):
         hub.show(Postures(number, 5.0, here, Drive(0.0, 0.0), here))
         hub.tell(Tasks(reason=f"after {number}"))
-        session.desk.advance(now=5.0 + number)  # type: ignore[attr-defined]
+        session.hub.advance(now=5.0 + number)
         for data in session.advance(now=5.0 + number):
             core.receive(data, now=float(number))
     assert core.newest[Postures].number == 2
