@@ -23,7 +23,7 @@ from interfaces.messages.jobs import (
     Progress,
 )
 from interfaces.messages.mobile import Plan, Seen, Tasks
-from interfaces.stream.session import News
+from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
