@@ -6,11 +6,12 @@ import base64
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any, Final
+
+from markupsafe import escape
 
 from interfaces.lab.claims import interval_said, said
 from interfaces.lab.output import SCHEMA
@@ -178,7 +179,7 @@ def render(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) ->
     return Template(_asset("claims.html")).substitute(
         title=f"{held} of {total} claims hold",
         css=_asset("report.css"),
-        facts="".join(f"<li><span>{name}</span>{count}</li>" for name, count in counts),
+        facts="".join(f"<li><span>{escape(name)}</span>{count}</li>" for name, count in counts),
         papers=_sums(papers) + "".join(map(_section, papers)),
         beyond=f"<h2>Beyond the papers</h2>{_sums(beyond)}{''.join(map(_section, beyond))}" if beyond else "",
     )

@@ -6,13 +6,13 @@ import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
-from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any, Final
 
 import numpy as np
+from markupsafe import escape
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.output import of_drives
@@ -127,7 +127,7 @@ def _page_script(data: Mapping[str, Any]) -> str:
 def _script_json(value: object) -> str:
     """JSON that no browser takes for markup."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("'", "\\u0027")
 
 
 def _script(text: str) -> str:
