@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
@@ -74,7 +75,7 @@ def _exp(screw: Array, q: float) -> Array:
     return X
 
 
-def described(model: RobotModel, tool: Array) -> dict[str, Any]:
+def described(model: RobotModel, tool: ArrayLike) -> dict[str, Any]:
     """What a page needs to know of a robot: its chain, and the point that is drawn and dragged.
 
     Args:

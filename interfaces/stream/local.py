@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from interfaces.messages import Order, Outcome, Refusal, control
 from interfaces.stream.hub import Hub
-from interfaces.stream.session import State, Wish
+from interfaces.stream.leasing import Wish
 from vrs.clock import Clock
 from vrs.commands import Command
 from vrs.ledger import Receipt
@@ -35,14 +35,15 @@ class LocalClient:
         return self._clock.now()
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> control.State | None:
         """The real robot, as all clients are told."""
-        return self._hub.state
+        _, state = self._hub.news.get(control.State, (0, None))
+        return state if isinstance(state, control.State) else None
 
     @property
     def lease(self) -> control.Lease:
         """The lease as it is."""
-        lease = self._hub.lease_for(self._seat)
+        lease = self._hub.leasing.seen_by(self._seat)
         epoch = lease.epoch or 0 if lease.commands else 0
         if epoch != self._epoch:
             self._lapses += self._epoch > 0
@@ -56,7 +57,7 @@ class LocalClient:
 
     def ask(self, make: Callable[[int], Wish]) -> control.Lease | control.Problem | None:
         """Ask something of the lease; the answer."""
-        answer = self._hub.wish(self._seat, make(1), self.now())
+        answer = self._hub.leasing.wish(self._seat, make(1), self.now())
         self._changed()
         return answer
 

@@ -20,6 +20,7 @@ from vrs.clock import Clock
 
 if TYPE_CHECKING:
     from interfaces.teleop import OperatorSite
+    from interfaces.teleop.virtual_arm import VirtualArm
 
 HOST: Final = "127.0.0.1"
 """Terminals come from this machine only: there's no encryption."""
@@ -97,7 +98,7 @@ class TerminalRoom:
         return min([self._shared.next_deadline(), *(terminal.next_deadline() for terminal in self._terminals)])
 
 
-def served_room(client: LocalClient, site: OperatorSite, directory: Path, version: str) -> TerminalRoom:
+def served_room(client: LocalClient, site: OperatorSite[VirtualArm], directory: Path, version: str) -> TerminalRoom:
     """The room at a server's robot, which a client of the server in its own process moves.
 
     Args:

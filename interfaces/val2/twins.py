@@ -53,7 +53,7 @@ class _Operator:
 
     def execute(self, command: Command | None, now: float) -> Receipt | None:
         """Let the operator's site carry out a command, and record what the virtual robot accepts."""
-        site = self.session.operator
+        site = self.session.operator.robot
         if command is None:
             return site.undo(now=now)
         answer = site.execute(command, now=now)

@@ -9,6 +9,7 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.clients.designer import Issued
+from interfaces.messages.control import State, Welcome
 from interfaces.val2.motion.robot import OtherTwin, RobotPort
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
@@ -17,7 +18,6 @@ from vrs.model import RobotModel
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from interfaces.messages.control import State
     from interfaces.stream.connection import Connection
 
 _PATIENCE: Final = 2.0
@@ -153,6 +153,7 @@ def remote_robot(connection: Connection) -> RemoteRobot:
     from robots import puma560
 
     welcome = connection.welcome
+    assert isinstance(welcome, Welcome)
     model = puma560.model(limits=welcome.limits)
     if welcome.robot != model.name:
         raise InvalidValueError("robot", welcome.robot, f"{model.name}: VAL-II moves no other")

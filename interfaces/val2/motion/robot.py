@@ -14,6 +14,7 @@ from interfaces.clients.designer import Issued
 from interfaces.messages import Refusal, RefusalCode
 from interfaces.teleop.halt import text_of
 from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from vrs.clock import ManualClock
 from vrs.commands import Command
 from vrs.engine import Engine
@@ -147,10 +148,14 @@ class SiteRobot(EngineRobot):
     """The operator's site, of the laboratory or a server's own."""
 
     def __init__(
-        self, site: OperatorSite, execute: Execute | None = None, *, fault_poll_interval: float = math.inf
+        self,
+        site: OperatorSite[VirtualArm],
+        execute: Execute | None = None,
+        *,
+        fault_poll_interval: float = math.inf,
     ) -> None:
         """Reach a site; see `EngineRobot`."""
-        super().__init__(site.engine, execute, fault_poll_interval=fault_poll_interval)
+        super().__init__(site.robot.engine, execute, fault_poll_interval=fault_poll_interval)
         self._site = site
 
     @property
