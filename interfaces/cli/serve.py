@@ -388,14 +388,13 @@ def _station(serving: _Serving) -> Station:
     """Make the page."""
     from interfaces.station.chain import described
     from interfaces.station.page import Station
-    from interfaces.station.panels import MOBILE_PANELS, PANELS
+    from interfaces.station.panels import Offer, panels_of
 
     robot = serving.robot
-    if robot.is_base:
-        panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
-        return Station({"mobile": True, "name": robot.name}, panels=panels)
-    panels = tuple(panel for panel in PANELS if serving.val is not None or panel.name != "terminal")
-    return Station(described(robot.arm, robot.tool), panels=panels)
+    offers = {Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS, Offer.RECORDINGS}
+    offers |= {Offer.CAMERA} if serving.camera else set()
+    offers |= {Offer.TERMINALS} if serving.val is not None else set()
+    return Station(described(robot), panels_of(offers))
 
 
 def _load(robot: Robot) -> None:
