@@ -32,7 +32,7 @@ from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import load
 from robots.onboard import WatchdogConfig
-from robots.robot import EXACT
+from robots.robot import IDEAL
 
 ROBOT = load("puma560")
 MODEL = ROBOT.arm
@@ -73,7 +73,7 @@ class Rows:
 
 @contextlib.asynccontextmanager
 async def robot_here(
-    *, site: RobotSiteConfig | None = None, body: str = EXACT, port: int = 0
+    *, site: RobotSiteConfig | None = None, body: str = IDEAL, port: int = 0
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)

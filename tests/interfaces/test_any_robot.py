@@ -227,7 +227,7 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
     ("arguments", "said"),
     [
         (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
-        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
+        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, ideal"),
         (("console", "--robot", ARM), "an arm of 6 joints that turn"),
         (("serve", "--robot", "micro", "--camera", "3"), "micro has nothing of the kind"),
         (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),

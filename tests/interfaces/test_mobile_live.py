@@ -42,7 +42,7 @@ from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal, JourneyState
-from robots.robot import EXACT
+from robots.robot import IDEAL
 from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
@@ -180,7 +180,7 @@ def test_an_operator_takes_no_other_robot_and_no_other_room(other: str) -> None:
             body = PacedBody(PacedConfig(ROBOT, place("lane")))
         else:
             arm = load("puma560")
-            body = PhysicsBody(PhysicsConfig(arm, arm.arm.poses["ready"], EXACT))
+            body = PhysicsBody(PhysicsConfig(arm, arm.arm.poses["ready"], IDEAL))
         async with listening(LiveRobot(body, Access(free={Role.SITE}))) as url:
             config = LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions())
             async with LiveMobileOperator(config, Access(free=OPEN)).running() as operator, asyncio.timeout(20.0):
