@@ -35,7 +35,7 @@ from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
 from interfaces.recording.history import edit_entries, whole_entries
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import Correction, OperatorSite
+from interfaces.teleop import Correction, OperatorSite, VirtualArm
 from interfaces.teleop.operator import SiteObserver
 from vrs.commands import Profile
 from vrs.ledger import Receipt, Standing, Status
@@ -69,7 +69,7 @@ class _Happened(NamedTuple):
     after: Timeline
 
 
-class Capture(SiteObserver):
+class Capture(SiteObserver[Report, Timeline]):
     """Writes down an operator's site: it listens, and writes what is due when it's told the time.
 
     While it listens it only takes notes: commands don't wait for it.
@@ -77,7 +77,7 @@ class Capture(SiteObserver):
 
     def __init__(
         self,
-        operator: OperatorSite,
+        operator: OperatorSite[VirtualArm],
         model: RobotModel,
         *,
         now: float,
@@ -100,7 +100,7 @@ class Capture(SiteObserver):
         self.operator, self.model, self.step, self._every = operator, model, step, every
         self.put: Put | None = None
         """Takes what is written; None at first, and when nothing can be written any more."""
-        self._timeline = timeline = operator.engine.timeline
+        self._timeline = timeline = operator.robot.engine.timeline
         self._cut = max(min(timeline.index_at(now) - 2, len(timeline) - most_before), 0)
         self._happened: deque[_Happened] = deque()
         self._due: list[tuple[float, Message]] = []
@@ -111,8 +111,8 @@ class Capture(SiteObserver):
         self._pose = Paced(POSE_RATE)
         self.links = Paced(LINK_RATE)
         """When links of the virtual robot are shown."""
-        fresh = not operator.engine.newest and not len(timeline) and timeline.start == now
-        self.late = None if fresh else operator.engine.standing()
+        fresh = not operator.robot.engine.newest and not len(timeline) and timeline.start == now
+        self.late = None if fresh else operator.robot.engine.standing()
         """How the engine stood; None where nothing had happened yet."""
         self._began = timeline, now
         operator.listener = self
@@ -150,7 +150,7 @@ class Capture(SiteObserver):
         raise error
 
     def _note(self, what: CommandRecord | tuple[Correction, Timeline]) -> None:
-        before, self._timeline = self._timeline, self.operator.engine.timeline
+        before, self._timeline = self._timeline, self.operator.robot.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))
         if len(self._happened) >= _WAITING:
             self._tell_happened()
@@ -193,7 +193,7 @@ class Capture(SiteObserver):
         """Write down what is due; the virtual robot's times [s], (k,), and joints [rad], (k, n), for the driver."""
         self._tell_happened()
         t = self._times(now)
-        q = self.operator.engine.timeline.sample(t)
+        q = self.operator.robot.engine.timeline.sample(t)
         self._sample(t, q)
         return t, q
 
@@ -251,7 +251,7 @@ class Capture(SiteObserver):
 
     def _revise(self) -> None:
         """Write down receipts that later commands changed."""
-        engine = self.operator.engine
+        engine = self.operator.robot.engine
         for command_id in list(self._known)[:-_WATCHED]:
             del self._known[command_id]
         for command_id, version in self._known.items():

@@ -152,7 +152,7 @@ class LiveRecorder:
         self._capture = _LiveCapture(line, model, now)
         for way in (line.link.forward, line.link.backward):
             way.log.take()
-        link, engine = line.link.conditions.forward, line.operator.engine
+        link, engine = line.link.conditions.forward, line.operator.robot.engine
         self._begin = Begin(
             t=now,
             robot=model.name,
@@ -268,7 +268,7 @@ class LiveRecorder:
         receipts: tuple[Receipt, ...] = ()
         if not self._stopped:
             self.advance(now=now, connected=self._connected)
-            receipts = self._capture.operator.engine.receipts
+            receipts = self._capture.operator.robot.engine.receipts
             late = self._begin.late
             if late is not None:
                 receipts = tuple(one for one in receipts if one.command_id > late.newest)

@@ -51,7 +51,7 @@ from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.runs.summary import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runs.twin_run import Turn, TwinRun
 from interfaces.system import software
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
@@ -78,9 +78,9 @@ class RunRecorder:
         self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
 
-    def begin(self, begin: Begin, operator: OperatorSite) -> None:
+    def begin(self, begin: Begin, operator: OperatorSite[VirtualArm]) -> None:
         """Begin the file."""
-        self._capture = Capture(operator, operator.engine.model, now=0.0, step=begin.step, every=True)
+        self._capture = Capture(operator, operator.robot.engine.model, now=0.0, step=begin.step, every=True)
         try:
             self._writer = RecordingWriter(self.path, begin)
         except RecordingError as error:

@@ -3,13 +3,34 @@
 from __future__ import annotations
 
 import hmac
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from interfaces.messages import Order, Refusal, RefusalCode, control
-from interfaces.messages.control import OVERRULED, Problem, ProblemCode, may_send
+from interfaces.messages.control import OVERRULED, Problem, ProblemCode, Role, may_send
 from interfaces.messages.fields import Epoch
-from interfaces.stream.session import SessionState, Wish
 from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
+
+if TYPE_CHECKING:
+    from interfaces.engine_server.servlet import Servlet
+    from interfaces.stream.driving import DriveServlet
+
+
+Wish: TypeAlias = (
+    control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
+)
+"""What a client asks of the lease."""
+
+
+class SessionState:
+    """What a session keeps while its connection is lost: who it is, and its servlet."""
+
+    __slots__ = ("key", "left", "name", "role", "servlet")
+
+    def __init__(self, key: str, name: str, role: Role) -> None:
+        self.key, self.name, self.role = key, name, role
+        self.servlet: Servlet | DriveServlet
+        self.left = 0.0
+        """When its connection was lost [s]."""
 
 
 class LeasedRobot(Protocol):

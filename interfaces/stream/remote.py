@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from interfaces.clients.designer import Designer, Issued
 from interfaces.clients.observer import Observation, Observer
@@ -19,7 +18,7 @@ from vrs.timeline import Timeline
 class RemoteDesigner:
     """A `Designer` under a lock. Commands that have no answer when a session is lost are refused as unknown."""
 
-    def __init__(self, session: Line[Any]) -> None:
+    def __init__(self, session: Line) -> None:
         self._session = session
         self._designer = Designer(session.port)
 
@@ -82,7 +81,7 @@ class RemoteDesigner:
 class RemoteObserver:
     """An `Observer` under a lock."""
 
-    def __init__(self, session: Line[Any]) -> None:
+    def __init__(self, session: Line) -> None:
         self._session = session
         self._observer = Observer(session.port)
 
@@ -145,7 +144,7 @@ class RemoteViewer:
 
     def __init__(
         self,
-        session: Line[Any],
+        session: Line,
         *,
         rate: float,
         form: ViewForm,

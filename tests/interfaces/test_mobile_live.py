@@ -34,7 +34,7 @@ from interfaces.runtime.physics import PhysicsConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
-from interfaces.stream.connection import MobileConnection
+from interfaces.stream.connection import Connection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.driving import DrivenConfig
@@ -79,17 +79,17 @@ async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
             yield Serving(own)
 
 
-def met(url: str, name: str) -> MobileConnection:
+def met(url: str, name: str) -> Connection:
     """A connection whose robot has been met."""
     robot = connect_mobile(url, name=name, timeout=20.0)
     assert robot.wait(lambda it: it.postures is not None and it.postures.real is not None, 30.0)
     return robot
 
 
-def controlled(robot: MobileConnection) -> None:
+def controlled(robot: Connection) -> None:
     """Have control, with a drive begun or jobs going on."""
 
-    def has(_: MobileConnection) -> bool:
+    def has(_: Connection) -> bool:
         answer = robot.acquire()
         return isinstance(answer, Lease) and answer.yours
 

@@ -13,7 +13,7 @@ from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob,
 from interfaces.messages.mobile import Plan, Tasks
 from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
-from interfaces.stream.session import News
+from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
 from robots.onboard.journey import Goal

@@ -597,23 +597,6 @@ function map(x, where) {
  * @property {string} [reason] text of up to 500 characters (empty). Why it's paused, has failed, or was aborted.
  */
 /**
- * What a robot, or a list of jobs, is asked to do: `go`, `do`, `jobs` or `halt`.
- * @typedef {object} RobotTask
- * @property {Goal|null} [go] map of `x`, `y`, `heading` (absent) (absent). Drive there; a list of jobs that is being done is paused.
- * @property {"run"|"pause"|"resume"|"abort"|"key"|"dry-run"|null} [do] `run`, `pause`, `resume`, `abort`, `key`, `dry-run` (absent).
- * @property {JobList|null} [jobs] map of `jobs` (none), `places` (none) (absent). Take this list in place of the one before; not while that is being done.
- * @property {Progress|null} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (absent). How far that list is already; None: as far as is known of jobs with the same number that are unchanged.
- * @property {string|null} [halt] text (absent). Between sites: stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused.
- */
-/**
- * Holder: Let the robot do something by itself. The answer is a `Tasks` or a `Problem`.
- * @typedef {object} TaskOrder
- * @property {"task"} type
- * @property {number} number number. The client's own; the answer has it, too.
- * @property {RobotTask} task map of `go` (absent), `do` (absent), `jobs` (absent), `progress` (absent), `halt` (absent). What.
- * @property {string|null} [epoch] epoch (absent). Of the control lease.
- */
-/**
  * What is likely to become of a job.
  * @typedef {object} JobForecast
  * @property {number} number number.
@@ -657,6 +640,23 @@ function map(x, where) {
  * @property {Array<Array<[number, number]>>} [things] up to 1000 × up to 64 × [real, real] (none). Outlines of what the map knows [m].
  * @property {Array<[number, number]>} [via] up to 720 × [real, real] (none). Via points [m].
  * @property {[number, number, number]} [robot] [real ≥ 0, real ≥ 0, real ≥ 0] ([0, 0, 0]). What it reaches ahead and back from its axle, and its width [m].
+ */
+/**
+ * What a robot, or a list of jobs, is asked to do: `go`, `do`, `jobs` or `halt`.
+ * @typedef {object} RobotTask
+ * @property {Goal|null} [go] map of `x`, `y`, `heading` (absent) (absent). Drive there; a list of jobs that is being done is paused.
+ * @property {"run"|"pause"|"resume"|"abort"|"key"|"dry-run"|null} [do] `run`, `pause`, `resume`, `abort`, `key`, `dry-run` (absent).
+ * @property {JobList|null} [jobs] map of `jobs` (none), `places` (none) (absent). Take this list in place of the one before; not while that is being done.
+ * @property {Progress|null} [progress] map of `stage` (`planned`), `jobs` (none), `reason` (empty) (absent). How far that list is already; None: as far as is known of jobs with the same number that are unchanged.
+ * @property {string|null} [halt] text (absent). Between sites: stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused.
+ */
+/**
+ * Holder: Let the robot do something by itself. The answer is a `Tasks` or a `Problem`.
+ * @typedef {object} TaskOrder
+ * @property {"task"} type
+ * @property {number} number number. The client's own; the answer has it, too.
+ * @property {RobotTask} task map of `go` (absent), `do` (absent), `jobs` (absent), `progress` (absent), `halt` (absent). What.
+ * @property {string|null} [epoch] epoch (absent). Of the control lease.
  */
 const WORDS_1 = new Set(["accepted", "postponed", "rejected"]);
 const WORDS_2 = new Set(["other", "overruled", "not-following"]);

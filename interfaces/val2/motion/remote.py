@@ -8,6 +8,7 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.clients.designer import Issued
+from interfaces.messages.control import State, Welcome
 from interfaces.val2.motion.robot import CommandOutcome, RobotPort, standing
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
@@ -16,7 +17,6 @@ from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from interfaces.messages.control import State
     from interfaces.stream.connection import Connection
 
 _PATIENCE: Final = 2.0
@@ -162,6 +162,7 @@ def remote_robot(connection: Connection) -> RemoteRobot:
     from robots import puma560
 
     welcome = connection.welcome
+    assert isinstance(welcome, Welcome)
     model = puma560.model(limits=welcome.limits)
     if welcome.robot != model.name:
         raise InvalidValueError("robot", welcome.robot, f"{model.name}: VAL-II moves no other")
