@@ -21,11 +21,11 @@ from interfaces.messages.control import MOST_MESSAGES, Role
 from interfaces.messages.drive_sites import Doing, DriveReport, RobotTask
 from interfaces.messages.jobs import ArmJob, OperatorLoss
 from interfaces.messages.mobile import Postures, Tasks
+from interfaces.runtime.live.base_twins import MobileDrawing, reality
 from interfaces.runtime.live.emulation import LiveEmulation
-from interfaces.runtime.live.mobile_drawing import MobileDrawing, reality
-from interfaces.runtime.live.mobile_tasks import TaskDesk
 from interfaces.runtime.live.operator import SHOW
 from interfaces.runtime.live.robot_client import GONE, RobotClient
+from interfaces.runtime.live.task_desk import TaskDesk
 from interfaces.stream.access import Access
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.hub import Hub, HubConfig, Workers

@@ -11,8 +11,8 @@ from interfaces.jobs import JobFile
 from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from interfaces.messages.mobile import Plan, Tasks
-from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
-from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
+from interfaces.runtime.live.base_twins import ROUTE_SPEED, route_timeline
+from interfaces.runtime.live.task_desk import TOO_LONG, TaskDesk
 from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
