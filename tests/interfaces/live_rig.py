@@ -93,7 +93,7 @@ async def operator_here(url: str, *, delay: str = "none") -> AsyncIterator[tuple
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, url, link), Access(free=OPEN))
+    operator = LiveOperator(LiveOperatorConfig(ROBOT, url, link, q=NOMINAL), Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"
