@@ -19,7 +19,7 @@ from interfaces.stream.driving import DriveSite
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.architectures import OperatorSurroundings
-from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
+from interfaces.teleop.architectures.compositions import ESTIMATING, grid_of, operator_surroundings
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
@@ -174,11 +174,12 @@ class BaseTwins(LiveTwins[VirtualBase]):
                 self._ways["real"].go(operator.report.posture)
 
     @override
-    def draw(self, *, now: float) -> None:
+    def draw(self, attached: Attached | None, *, now: float) -> None:
         self._follow()
         if not self.scene.readers:
             return
         operator, virtual = self.operator, self.operator.robot
+        virtual.estimating = attached is not None and attached.architecture in ESTIMATING
         known = self.reality(now)
         if known is not None:
             self._measure(known[0])

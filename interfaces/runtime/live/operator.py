@@ -168,7 +168,7 @@ class LiveOperator(LeasedRobot, Workers):
         self.scene.dress(await asyncio.to_thread(bodies, self.config.which))
         while True:
             await asyncio.sleep(SHOW)
-            self.twins.draw(now=self.clock.now())
+            self.twins.draw(self.robot.attached, now=self.clock.now())
 
     def _turn(self, now: float) -> float | None:
         operator = self.operator

@@ -66,8 +66,13 @@ class LiveTwins(Protocol[V]):
         """
 
     @abstractmethod
-    def draw(self, *, now: float) -> None:
-        """Draw both as they are at session time now [s] for those who look, and note what's to be drawn later."""
+    def draw(self, attached: Attached | None, *, now: float) -> None:
+        """Draw both for those who look, and note what's to be drawn later.
+
+        Args:
+            attached: What the real one said of itself; None while there's no connection.
+            now: Session time [s].
+        """
 
     @abstractmethod
     def freed(self) -> None:
@@ -78,7 +83,7 @@ class LiveTwins(Protocol[V]):
         """How they are, for `/health`.
 
         Args:
-            attached: What the real one said of itself; None while there's no connection.
+            attached: See `draw`.
         """
 
     @property
@@ -144,7 +149,7 @@ class ArmTwins(LiveTwins[VirtualArm]):
         )
 
     @override
-    def draw(self, *, now: float) -> None:
+    def draw(self, attached: Attached | None, *, now: float) -> None:
         if not self.scene.readers:
             return
         operator, report = self.operator, self.operator.report

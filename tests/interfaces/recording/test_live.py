@@ -56,17 +56,17 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
 
     async def main():
         async with robot_here() as (_, url), recorded(url, path, told) as live:
-            site, clock = live.operator, live.clock
+            virtual, clock = live.operator.robot, live.clock
             heard = live.operator.listener.reported
             live.operator.listener.reported = lambda r, *, now: (reports.append(r), heard(r, now=now))
-            site.execute(MotionCommand(JointTarget(READY)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY)), now=clock.now())
             await asyncio.sleep(0.3)
-            site.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
-            site.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
+            virtual.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
             await asyncio.sleep(0.1)
-            site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
-            site.undo(now=clock.now())
-            await until(lambda: set(site.receipts) >= {1, 3, 4})
+            virtual.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
+            virtual.undo(now=clock.now())
+            await until(lambda: set(virtual.receipts) >= {1, 3, 4})
             live.emulation.impair(
                 Impair(1, 1, DirectionConditions("constant:0.03", "0", "in-order")), "Ada", now=clock.now()
             )
@@ -77,7 +77,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             assert (health["file"], health["dropped"], health["problem"]) == (str(path), 0, None)
             # The block that's open, a turn of the recorder's thread and one of the site's, on a busy machine.
             assert health["written_s"] > clock.now() - 1.5
-            return site.engine.timeline, site.engine.receipts
+            return virtual.engine.timeline, virtual.engine.receipts
 
     timeline, receipts = asyncio.run(main())
     assert told == []
