@@ -420,7 +420,9 @@ def _drive_case(recording: Recording) -> DriveCase:
     try:
         same = {name: getattr(facts, name) for name in ("architecture", "operator", "length", "position")}
         transport, seed = Transport(facts.transport), begin.seed or 0
-        return DriveCase(transport=transport, delay=begin.delay, robot=facts.body, seed=seed, **same)
+        return DriveCase(
+            transport=transport, delay=begin.delay, robot=facts.body, known=recording.robot, seed=seed, **same
+        )
     except InvalidValueError as error:
         raise FormatError(str(recording.path), f"its beginning: {error}") from None
 

@@ -33,7 +33,7 @@ from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
-from robots.robot import Robot, load, names
+from robots.robot import BARE, Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
@@ -183,9 +183,8 @@ class Recording:
             FormatError: If it's none that is known here, or has other joints.
         """
         begin = self.session
-        # Mobile robots of one family have its name, and a body of their own.
-        own = begin.drive is not None and begin.drive.body in names()
-        name = begin.drive.body if own and begin.drive is not None else begin.robot
+        # Mobile robots of one family have its name as their model's, and a name of their own.
+        name = begin.robot if begin.drive is None or begin.drive.body == BARE else begin.drive.body
         robot = self._robot
         if (robot is None or robot.name != name) and name in names():
             robot = load(name)

@@ -57,6 +57,7 @@ from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import MobileRobot
 from robots.onboard.driving import Posture
+from robots.robot import BARE
 from vrs.commands import Lateness
 from vrs.errors import FormatError
 from vrs.mobile import Grid
@@ -286,7 +287,7 @@ class DriveRecorder(Witness):
             lateness=str(Lateness.POSTPONE),
             software=software(),
             drive=d.DriveFacts(
-                body=case.robot,  # type: ignore[arg-type]
+                body=BARE if case.robot == BARE else case.real[0].name,
                 architecture=case.architecture,
                 transport=case.transport.value,
                 operator=text(case.operator)[:LONGEST_WORD],

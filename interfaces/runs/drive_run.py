@@ -47,6 +47,8 @@ class DriveCase:
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""
+    known: Robot | None = field(default=None, repr=False, compare=False)
+    """The robot, where somebody has it; else it's found by what `robot` says."""
 
     @property
     def group(self) -> tuple[str, str, str, str, str]:
@@ -61,7 +63,9 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        return (load(USUAL_BASE), BARE) if self.robot == BARE else (load(self.robot), "")
+        if self.robot == BARE:
+            return load(USUAL_BASE), BARE
+        return load(self.robot) if self.known is None else self.known, ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
