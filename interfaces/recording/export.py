@@ -17,8 +17,9 @@ from interfaces.messages.description import described
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import Anchor, ArcEntry, CommandPacket, CommandRecord, LinkEntry, RunEvent
 from interfaces.recording.history import arm_timeline
+from interfaces.recording.kinds import ARM
 from interfaces.recording.poses import quaternions
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.recording import Recording
 from interfaces.recording.track import ESTIMATED, MEASURED
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt

@@ -12,7 +12,8 @@ from typing_extensions import override
 
 from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
 from interfaces.recording.history import AnyTimeline, arm_timeline
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.kinds import ARM
+from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of
 from interfaces.recording.track import (

@@ -8,8 +8,9 @@ from typing import TypeAlias
 import numpy as np
 
 from interfaces.messages.recording import grid_of, room_of
+from interfaces.recording.kinds import ARM
 from interfaces.recording.playback import PlaybackFrame
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from vrs.model import Array

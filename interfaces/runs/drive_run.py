@@ -9,6 +9,7 @@ import numpy as np
 
 from interfaces.link.link import Link
 from interfaces.messages.drive_sites import ArchitectureReport, ArcPacket
+from interfaces.messages.recording import Direction
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
@@ -133,7 +134,7 @@ class Witness(Protocol):
     ) -> None:
         """The run begins; the site and the link tell those who listen."""
 
-    def sent(self, direction: str, now: float, size: int) -> None:
+    def sent(self, direction: Direction, now: float, size: int) -> None:
         """A packet of so many bytes goes `forward` or `backward` now [s]."""
 
 

@@ -101,7 +101,7 @@ class LiveOperator(LeasedRobot):
         self._recording_changes, self._closed = asyncio.Lock(), False
         if config.recording is not None:
             began = seconds_since_1970() - self.clock.now()
-            self.recorder = LiveRecorder(config.recording, self.line, model, seed=config.seed, began=began)
+            self.recorder = LiveRecorder(config.recording, self.line, seed=config.seed, began=began)
             self.recorder.open()
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -167,9 +167,7 @@ class LiveOperator(LeasedRobot):
             if self.recorder is not None or self._closed:
                 raise InvalidValueError("recording", what.path.name, "begun once the other one has ended")
             now, config = self.clock.now(), self.config
-            recorder = LiveRecorder(
-                what, self.line, config.arm.arm, seed=config.seed, began=seconds_since_1970(), now=now
-            )
+            recorder = LiveRecorder(what, self.line, seed=config.seed, began=seconds_since_1970(), now=now)
             try:
                 await asyncio.to_thread(recorder.open)
             except RecordingError:

@@ -169,7 +169,7 @@ def alone(path, way=None):
     """A recorder of an operator's site whose robot is far away."""
     link = LinkConditions() if way is None else LinkConditions.symmetric(way)
     line = RobotLine(OperatorSite(MODEL, NOMINAL, now=0.0), link, np.random.default_rng(0))
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8)
     recorder.open()
     return recorder, line
 
@@ -216,7 +216,7 @@ def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
     line.operator.execute(MotionCommand(JointTarget(READY)), now=0.0)
     line.advance(now=0.1)
     path = tmp_path / "live.mcap"
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8, now=60.0)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8, now=60.0)
     assert recorder.health()["written_s"] == 60.0
     recorder.open()
     line.operator.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)
