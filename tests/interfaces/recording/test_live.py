@@ -104,7 +104,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         (rerouted,) = [event.text for event in recording.events if event.kind == "rerouted"]
         assert rerouted.startswith("Ada changed the way to the robot: delay constant:0.03, loss 0, in-order; back ")
         found, value = figures(recording), summary(recording)
-        assert found.missing == ()
+        assert found.missing == []
         assert value["errors"]["servo"]["tool_max_m"] < 1e-9
         assert value["commands"]["virtual"] == {"accepted": 3, "postponed": 0, "rejected": 1}
         assert value["messages"]["delay_mean_s"] == 0.03
