@@ -70,7 +70,7 @@ class _Happened(NamedTuple):
     after: Timeline
 
 
-class Capture(SiteObserver):
+class Capture(SiteObserver[Report, Timeline]):
     """Writes down an operator's site: it listens, and writes what is due when it's told the time.
 
     While it listens it only takes notes: commands don't wait for it.

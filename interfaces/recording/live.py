@@ -80,7 +80,7 @@ class LiveRecorder(Capture):
             began: Seconds since 1970 now.
             now: Session time [s].
         """
-        self._site, engine = line.operator, line.operator.engine
+        self._site, engine = line.operator, line.operator.robot.engine
         super().__init__(engine, now=now, step=1.0 / RATE, every=False, apart=True)
         self._site.listener = self
         self.path, self.since = what.path, now

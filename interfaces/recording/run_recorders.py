@@ -42,7 +42,7 @@ from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.runs.summary import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runs.twin_run import Turn, TwinRun
 from interfaces.system import software
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
@@ -108,9 +108,9 @@ class RunRecorder(_FileRecorder):
         self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
 
-    def begin(self, begin: Begin, operator: OperatorSite) -> None:
+    def begin(self, begin: Begin, operator: OperatorSite[VirtualArm]) -> None:
         """Begin the file."""
-        self._capture = capture = Capture(operator.engine, now=0.0, step=begin.step, every=True)
+        self._capture = capture = Capture(operator.robot.engine, now=0.0, step=begin.step, every=True)
         operator.listener = capture
         self._open(begin)
         capture.put = self._put

@@ -12,7 +12,8 @@ import numpy as np
 from interfaces.messages.drive_sites import Doing
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.scene import PIECE
-from interfaces.teleop.driving import DrivingOperator
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import VirtualBase
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
 from robots.onboard.routes import Point
@@ -65,7 +66,7 @@ class _DrivenTrace:
             del self.places[:PIECE]
 
 
-def reality(operator: DrivingOperator, now: float) -> tuple[tuple[float, float, float], float] | None:
+def reality(operator: OperatorSite[VirtualBase], now: float) -> tuple[tuple[float, float, float], float] | None:
     """Where the real robot is, and the time in its room, as far as is known; None before its first report.
 
     Args:
@@ -78,7 +79,7 @@ def reality(operator: DrivingOperator, now: float) -> tuple[tuple[float, float, 
     report = operator.report
     if report is None:
         return None
-    posture = advanced(report.posture, *report.drive, min(operator.heard_ago(now), SMOOTHED))
+    posture = advanced(report.posture, *report.drive, min(now - operator.heard, SMOOTHED))
     world = 0.0 if report.world is None else report.world + max(0.0, now - report.measured_at)
     return posture, world
 
@@ -104,37 +105,37 @@ class MobileDrawing:
         self._committed: tuple[int, ArcTimeline] | None = None
         self._real: tuple[float, float, float] | None = None
 
-    def follow(self, operator: DrivingOperator) -> None:
+    def follow(self, operator: OperatorSite[VirtualBase]) -> None:
         """Note where both robots are; to be called also while nobody looks."""
-        if operator.epochs != self._drive:
-            self._drive, self._ways = operator.epochs, {"virtual": _DrivenTrace(), "real": _DrivenTrace()}
+        if operator.robot.epochs != self._drive:
+            self._drive, self._ways = operator.robot.epochs, {"virtual": _DrivenTrace(), "real": _DrivenTrace()}
         if not operator.halted:
-            self._ways["virtual"].go(operator.site.posture)
-            if operator.deviation is not None and operator.report is not None:
+            self._ways["virtual"].go(operator.robot.architecture.posture)
+            if operator.robot.deviation is not None and operator.report is not None:
                 self._ways["real"].go(operator.report.posture)
 
-    def show(self, operator: DrivingOperator, *, now: float) -> None:
+    def show(self, operator: OperatorSite[VirtualBase], *, now: float) -> None:
         """Show everything as it is at session time now [s]."""
         known = reality(operator, now)
         if known is not None:
             self._measure(known[0])
         committed = self._to_goal(operator)
-        if not operator.halted and operator.deviation is not None:
-            committed = Committed(self._to_rest(operator), operator.path.place)
-        around = operator.site.surroundings
+        if not operator.halted and operator.robot.deviation is not None:
+            committed = Committed(self._to_rest(operator), operator.robot.path.place)
+        around = operator.robot.architecture.surroundings
         self.scene.show(
-            virtual=np.array(operator.virtual(now)),
+            virtual=np.array(operator.robot.virtual(now)),
             real=None if self._real is None else np.array(self._real),
             path=committed,
             driven={twin: np.array(way.places).reshape(-1, 2) for twin, way in self._ways.items()},
-            learned=() if around is None else around.environment.obstacles(operator.next_t),
+            learned=() if around is None else around.environment.obstacles(operator.robot.next_t),
             t=0.0 if known is None else known[1],
             now=now,
         )
 
-    def _to_goal(self, operator: DrivingOperator) -> Committed | None:
+    def _to_goal(self, operator: OperatorSite[VirtualBase]) -> Committed | None:
         """The way that a robot drives by itself, as far as it hasn't driven it; None where there's none."""
-        report, tasks = operator.report, operator.tasks
+        report, tasks = operator.report, operator.robot.tasks
         if report is None or tasks is None or report.doing is Doing.NOTHING or len(tasks.route) < 2:
             return None
         if self._route is None or self._route[0] != tasks.route:
@@ -148,12 +149,11 @@ class MobileDrawing:
         if shown is None or math.dist(shown[:2], posture[:2]) > NOISE[0] or abs(shown[2] - posture[2]) > NOISE[1]:
             self._real = posture
 
-    def _to_rest(self, operator: DrivingOperator) -> ArcTimeline:
+    def _to_rest(self, operator: OperatorSite[VirtualBase]) -> ArcTimeline:
         """The virtual robot's path, and how it'd brake from there: what the real one is to follow."""
-        known = self._committed
-        if known is None or known[0] != operator.steps:
-            timeline, T = operator.site.engine.timeline, self._model.period
-            steps = braking(operator.site.before, T, self._model.limits)
-            tail = [ArcPiece(T, v, w, 0) for v, w in steps]
-            known = self._committed = operator.steps, timeline.edited(timeline.end, tail) if tail else timeline
+        known, robot = self._committed, operator.robot
+        if known is None or known[0] != robot.steps:
+            timeline, T = robot.engine.timeline, self._model.period
+            tail = [ArcPiece(T, v, w, 0) for v, w in braking(robot.architecture.before, T, self._model.limits)]
+            known = self._committed = robot.steps, timeline.edited(timeline.end, tail) if tail else timeline
         return known[1]

@@ -35,8 +35,9 @@ from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
-from interfaces.teleop.driving import DriveLine, DrivingOperator
 from interfaces.teleop.halt import Halt, HaltCause, text_of
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard import LossPolicy
@@ -90,7 +91,8 @@ class LiveMobileOperator(LeasedRobot, Workers):
         self.config = config
         self.clock = WallClock()
         start, model = Posture(*config.room.start), config.base.base
-        self.operator = DrivingOperator(model, start, now=0.0, around=self._around)
+        virtual = VirtualBase(model, start, now=0.0, around=self._around)
+        self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
         self.line = DriveLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -162,7 +164,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
                 self.drawing.show(self.operator, now=self.clock.now())
 
     def _turn(self, now: float) -> float | None:
-        report, steps = self.operator.report, self.operator.steps
+        report, steps = self.operator.report, self.operator.robot.steps
         for message in self.line.advance(now=now):
             self.robot.send(message)
         held = self.hub.lease_state is LeaseState.HELD
@@ -171,10 +173,10 @@ class LiveMobileOperator(LeasedRobot, Workers):
             self._wants_resume = bool(self.operator.resume(now=now))
         self._end_lease(now)
         self.desk.turn()
-        tasks = self.operator.tasks
+        tasks = self.operator.robot.tasks
         if self.media is not None and tasks is not None:
             self.media.presenter.follow(tasks.says, tasks.shows)
-        if self.operator.report is not report or self.operator.steps != steps:
+        if self.operator.report is not report or self.operator.robot.steps != steps:
             self._show(now)
             self.server.kick()
         return self.line.next_deadline()
@@ -190,13 +192,13 @@ class LiveMobileOperator(LeasedRobot, Workers):
         """A lease has ended: the robots stop on their way."""
         self._ending, self._wants_resume = now, False
         if not self._carries_on:
-            self.operator.stop()
+            self.operator.robot.stop(now=now)
         self._turning.soon()
 
     @property
     def _carries_on(self) -> bool:
         """Whether the robot goes on with what it does by itself, also where nobody has control."""
-        tasks, doing = self.operator.tasks, self.operator.doing
+        tasks, doing = self.operator.robot.tasks, self.operator.robot.doing
         return doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
 
     @override
@@ -216,11 +218,11 @@ class LiveMobileOperator(LeasedRobot, Workers):
 
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""
-        if self._ending == -math.inf or not self.operator.stands:
+        if self._ending == -math.inf or not self.operator.robot.stands:
             return
         if (
             self._carries_on
-            or self.operator.done
+            or self.operator.robot.done
             or self.line.silence(now=now) >= GONE
             or now >= self._ending + PATIENCE
         ):
@@ -238,7 +240,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
 
     def _show(self, now: float) -> None:
         """Tell clients where both robots are."""
-        operator, report, deviation = self.operator, self.operator.report, self.operator.deviation
+        operator, report, deviation = self.operator, self.operator.report, self.operator.robot.deviation
         self._states += 1
         real: dict[str, Any] = {}
         if report is not None:
@@ -250,12 +252,12 @@ class LiveMobileOperator(LeasedRobot, Workers):
             Postures(
                 number=self._states,
                 now=now,
-                virtual=operator.virtual(now),
-                command=operator.site.before,
-                estimate=Posture(*operator.site.estimator.posture.tolist()),
+                virtual=operator.robot.virtual(now),
+                command=operator.robot.architecture.before,
+                estimate=Posture(*operator.robot.architecture.estimator.posture.tolist()),
                 connected=self.robot.connected,
                 halted=operator.gone or ("" if operator.cause is HaltCause.BY_ITSELF else text_of(operator.halted)),
-                drives=operator.epochs,
+                drives=operator.robot.epochs,
                 round_trip=operator.round_trip,
                 messages=self.line.messages()[-MOST_MESSAGES:],
                 **real,
@@ -264,7 +266,7 @@ class LiveMobileOperator(LeasedRobot, Workers):
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
-        attached, report, deviation = self.robot.attached, self.operator.report, self.operator.deviation
+        attached, report, deviation = self.robot.attached, self.operator.report, self.operator.robot.deviation
         return {
             "robot_at": self.robot.url,
             "room": self.config.room.name,
@@ -272,8 +274,8 @@ class LiveMobileOperator(LeasedRobot, Workers):
             **self.robot.health(),
             "halted": text_of(self.operator.halted),
             "epoch": self.operator.epoch,
-            "drives": self.operator.epochs,
-            "doing": self.operator.doing,
+            "drives": self.operator.robot.epochs,
+            "doing": self.operator.robot.doing,
             "jobs": {"stage": self.desk.progress.stage, "problem": self.desk.problem},
             "D": None if report is None else report.D,
             "path_error": None if deviation is None else deviation.path_error,

@@ -24,8 +24,9 @@ from interfaces.messages.jobs import (
 )
 from interfaces.messages.mobile import Plan, Seen, Tasks
 from interfaces.stream.session import News
-from interfaces.teleop.driving import DrivingOperator
 from interfaces.teleop.halt import HaltCause
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
 from robots.bullet.rooms import Room
 from robots.ipr.navigation import outline_of, route_map
@@ -49,7 +50,7 @@ class TaskDesk:
 
     def __init__(
         self,
-        operator: DrivingOperator,
+        operator: OperatorSite[VirtualBase],
         room: Room,
         base: MobileBase,
         tell: Callable[[News], None],
@@ -110,7 +111,7 @@ class TaskDesk:
             return self._edit(task.jobs)
         if task.do is ListCommand.DRY_RUN:
             return self._try()
-        return self._operator.order(task) if task.do is None else self._command(task, task.do)
+        return self._operator.robot.order(task) if task.do is None else self._command(task, task.do)
 
     def _edit(self, jobs: JobList) -> str:
         """Take another list, and keep it."""
@@ -131,8 +132,8 @@ class TaskDesk:
             return refusal
         has = self._report is not None and self._report.digest == self._digest
         if has:
-            return self._operator.order(task)
-        return self._operator.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
+            return self._operator.robot.order(task)
+        return self._operator.robot.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
 
     def _try(self) -> str:
         """Begin a dry run of the list, from where the robot is."""
@@ -161,11 +162,11 @@ class TaskDesk:
 
     @property
     def _doing(self) -> Doing:
-        return self._operator.doing
+        return self._operator.robot.doing
 
     def turn(self) -> None:
         """Take in what the robot has said, and tell everybody what is new."""
-        report, sight = self._operator.tasks, self._operator.sight
+        report, sight = self._operator.robot.tasks, self._operator.robot.sight
         if report is not None and report is not self._report:
             self._report = report
             if report.digest == self._digest and self.jobs.jobs and report.progress != self.progress:

@@ -31,7 +31,7 @@ from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
-from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine
+from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.onboard import LossPolicy
@@ -93,8 +93,9 @@ class LiveOperator(LeasedRobot):
         model = config.arm.arm
         warm(model, config.q)
         self.clock = WallClock()
-        self.operator = OperatorSite(model, config.q, now=0.0, config=config.site, halted=Halt(HaltCause.NOT_MET))
-        self.site = Site(self.operator.engine)
+        virtual = VirtualArm(model, config.q, now=0.0, config=config.site)
+        self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
+        self.site = Site(self.operator.robot.engine)
         self.line = RobotLine(self.operator, config.conditions, np.random.default_rng(config.seed))
         self.recorder: LiveRecorder | None = None
         self._recording: asyncio.Task[None] | None = None
@@ -150,7 +151,7 @@ class LiveOperator(LeasedRobot):
             await asyncio.sleep(SHOW)
             if not self.scene.readers:
                 continue
-            now, report, timeline = self.clock.now(), self.operator.report, self.operator.engine.timeline
+            now, report, timeline = self.clock.now(), self.operator.report, self.operator.robot.engine.timeline
             follows = report is not None and not self.operator.halted
             path = Committed(timeline, report.q_at) if follows and report is not None else None
             real = None if report is None else report.q
@@ -205,14 +206,14 @@ class LiveOperator(LeasedRobot):
             recorder.advance(now=self.clock.now(), connected=self.robot.connected)
 
     def _turn(self, now: float) -> float | None:
-        version = self.operator.engine.timeline.version
+        version = self.operator.robot.engine.timeline.version
         for message in self.line.advance(now=now):
             self.robot.send(message)
         if self._wants_resume and (not self.operator.halted or not self.operator.resume(now=now)):
             self._wants_resume = False
         self._end_lease(now)
         self._show(now)
-        if self.operator.engine.timeline.version != version:
+        if self.operator.robot.engine.timeline.version != version:
             self.server.kick()
         return self.line.next_deadline()
 
@@ -227,7 +228,7 @@ class LiveOperator(LeasedRobot):
         """A lease has ended: the robots stop on their way."""
         self._ending, self._wants_resume = True, False
         with contextlib.suppress(VrsError):
-            self.operator.execute(Stop(), now=now)
+            self.operator.robot.execute(Stop(), now=now)
         self._turning.soon()
 
     @override
@@ -243,7 +244,7 @@ class LiveOperator(LeasedRobot):
 
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""
-        report, end = self.operator.report, self.operator.engine.timeline.end
+        report, end = self.operator.report, self.operator.robot.engine.timeline.end
         if not self._ending or now < end:
             return
         heard = self.line.silence(now=now) < GONE
@@ -270,7 +271,7 @@ class LiveOperator(LeasedRobot):
             return
         self._shown = shown
         self._states += 1
-        expected = self.operator.engine.timeline.sample(report.q_at)
+        expected = self.operator.robot.engine.timeline.sample(report.q_at)
         self.hub.show(
             State(
                 number=self._states,
@@ -283,11 +284,11 @@ class LiveOperator(LeasedRobot):
                 epoch=Epoch(report.epoch) if report.epoch else None,
                 connected=self.robot.connected,
                 halted=halted,
-                corrections=len(self.operator.corrections),
+                corrections=len(self.operator.robot.corrections),
                 reference=report.reference,
                 round_trip=self.operator.round_trip,
                 messages=self.line.messages()[-MOST_MESSAGES:],
-                late=tuple((one.t, one.q) for one in self.operator.gathering.late(since=now - TOLD_AGAIN)),
+                late=tuple((one.t, one.q) for one in self.operator.robot.gathering.late(since=now - TOLD_AGAIN)),
             )
         )
         self.server.kick()
@@ -299,7 +300,7 @@ class LiveOperator(LeasedRobot):
             **self.robot.health(halted.text if halted is not None and halted.cause is HaltCause.STUCK else ""),
             "halted": text_of(halted),
             "epoch": self.operator.epoch,
-            "corrections": len(self.operator.corrections),
+            "corrections": len(self.operator.robot.corrections),
             "behind": None if report is None or report.halted else report.measured_at - report.q_at,
             "link_loss": None if attached is None else attached.link_loss,
             "offset": None if attached is None else attached.offset,

@@ -13,6 +13,7 @@ from typing_extensions import override
 from interfaces.messages import RefusalCode
 from interfaces.teleop.halt import text_of
 from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from vrs.clock import ManualClock
 from vrs.commands import Command
 from vrs.engine import Engine
@@ -163,7 +164,7 @@ class SiteRobot(EngineRobot):
     """The operator's site of the laboratory."""
 
     def __init__(
-        self, site: OperatorSite, executed: Callable[[float, Command, Receipt], None] | None = None
+        self, site: OperatorSite[VirtualArm], executed: Callable[[float, Command, Receipt], None] | None = None
     ) -> None:
         """Reach a site.
 
@@ -171,13 +172,13 @@ class SiteRobot(EngineRobot):
             site: The operator's.
             executed: Is called with what was carried out, and when [s].
         """
-        super().__init__(site.engine)
+        super().__init__(site.robot.engine)
         self._site, self._executed = site, executed
 
     def _do(self, command: Command | None, now: float) -> Receipt | None:
         if command is None:
-            return self._site.undo(now=now)
-        answer = self._site.execute(command, now=now)
+            return self._site.robot.undo(now=now)
+        answer = self._site.robot.execute(command, now=now)
         assert isinstance(answer, Receipt)
         if self._executed is not None and answer.status is not Status.REJECTED:
             self._executed(now, command, answer)
