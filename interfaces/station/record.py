@@ -85,7 +85,7 @@ class Recordings:
 
         self.replays = Replays(shelf, operator.clock, allowed)
         self._board = Newest(b'{"kind":"begin"}')
-        self._viewers = Viewers(self._board, None, allowed)
+        self._viewers = Viewers(self._board, allowed)
         self._looking = asyncio.Event()
         self._asked = {role: Bucket(RATE, BURST, operator.clock.now()) for role in Role}
         self._tickets: OrderedDict[str, tuple[Path, float]] = OrderedDict()
