@@ -446,7 +446,7 @@ class Hub:
     @property
     def lease_state(self) -> LeaseState:
         """Where the lease is."""
-        return self.leasing.state
+        return self.leasing.lease.state
 
     def commands(self, key: str, epoch: int, *, now: float) -> bool:
         """Whether a session has the lease, in that epoch, at now [s].
@@ -550,7 +550,7 @@ class Hub:
     def next_deadline(self) -> float | None:
         """When to call `advance` next [s]; None for not before something arrives."""
         sweep = self._sweep if self._sessions else None
-        return earliest(self.site.next_deadline(), self.leasing.next_deadline(), sweep)
+        return earliest(self.site.next_deadline(), self.leasing.lease.next_deadline(), sweep)
 
     def engine_time(self, now: float) -> float:
         """The engine's time [s] at the session time now [s]."""
@@ -599,7 +599,7 @@ class Hub:
         config = self.config
         return self.site.welcome(
             session=seat.key, role=seat.role, now=now, lease=self.leasing.seen_by(seat), resumed=resumed,
-            instance=config.instance, server=config.server, lease_timeout=self.leasing.timeout,
+            instance=config.instance, server=config.server, lease_timeout=self.leasing.lease.config.timeout,
         )  # fmt: skip
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
