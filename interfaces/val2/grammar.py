@@ -337,7 +337,7 @@ class _Trees:
             int(signal.value), value, times.get("AFTER", 0.0), times.get("FOR"), times.get("AT"), signal.at
         )
 
-    def expression(self, parts: list[Any]) -> Expression:
+    def operations(self, parts: list[Any]) -> Expression:
         """Operators and operands in a row: what binds more tightly comes first, else the left one does."""
         left_over = deque(parts)
         if len(parts) > 2 * DEEPEST:
