@@ -483,10 +483,10 @@ function map(x, where) {
 /**
  * How fast a mobile robot may be commanded, and how fast that may change.
  * @typedef {object} DriveLimits
- * @property {number} v_max real. Largest linear speed [m/s], either way, positive.
- * @property {number} w_max real. Largest angular speed [rad/s], either way, positive.
- * @property {number} a_max real. Largest linear acceleration [m/s²], positive.
- * @property {number} alpha_max real. Largest angular acceleration [rad/s²], positive.
+ * @property {number} v_max real > 0. Largest linear speed [m/s], either way, positive.
+ * @property {number} w_max real > 0. Largest angular speed [rad/s], either way, positive.
+ * @property {number} a_max real > 0. Largest linear acceleration [m/s²], positive.
+ * @property {number} alpha_max real > 0. Largest angular acceleration [rad/s²], positive.
  */
 /**
  * Server: The client may go on; what there is.
@@ -1044,10 +1044,10 @@ function checkNetwork(m) {
 }
 function checkDriveLimits(m) {
   map(m, "DriveLimits");
-  real(m.v_max, -REAL, REAL, "DriveLimits.v_max");
-  real(m.w_max, -REAL, REAL, "DriveLimits.w_max");
-  real(m.a_max, -REAL, REAL, "DriveLimits.a_max");
-  real(m.alpha_max, -REAL, REAL, "DriveLimits.alpha_max");
+  real(m.v_max, 5e-324, REAL, "DriveLimits.v_max");
+  real(m.w_max, 5e-324, REAL, "DriveLimits.w_max");
+  real(m.a_max, 5e-324, REAL, "DriveLimits.a_max");
+  real(m.alpha_max, 5e-324, REAL, "DriveLimits.alpha_max");
 }
 function checkMobileWelcome(m) {
   map(m, "mobile-welcome");
