@@ -36,6 +36,4 @@ while (t := link.next_deadline()) is not None:
 for name, way in (("datagrams", link.forward), ("in order", link.backward)):
     sums = way.log.totals()
     lost = sum(sums.lost.values())
-    print(
-        f"{name:9}: {sums.arrived} arrived, {lost} lost, {sums.resent} sent again, mean {sums.delay_mean:.3f} s"
-    )
+    print(f"{name:9}: {sums.arrived} arrived, {lost} lost, {sums.resent} sent again, mean {sums.delay_mean:.3f} s")
