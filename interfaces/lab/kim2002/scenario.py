@@ -80,7 +80,7 @@ def play(seed: int) -> Results:
 
     room = home(np.random.default_rng([seed, 1]))
     senses = Senses(camera=None, laser=LaserModel())
-    with MobileBody("ipr", room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
+    with MobileBody(IPR, room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
         return _played(room, body)
 
 

@@ -48,7 +48,7 @@ def test_the_scenario_is_played_to_its_end() -> None:
 
 @pytest.mark.parametrize(("friction", "stays"), [(0.5, True), (0.005, False)])
 def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bool) -> None:
-    with MobileBody("ipr", (0.0, 0.0, 0.0)) as body:
+    with MobileBody(IPR, (0.0, 0.0, 0.0)) as body:
         body.load(Cargo(friction=friction))
         for k in range(60):
             body.follow(0.5 if k % 20 < 10 else 0.0, 0.7 if k % 20 < 10 else -0.7)
@@ -59,7 +59,7 @@ def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bo
 
 
 def test_a_book_is_put_on_top_or_nowhere() -> None:
-    with MobileBody("ipr", (0.0, 0.0, 0.0)) as body, pytest.raises(InvalidValueError, match="top"):
+    with MobileBody(IPR, (0.0, 0.0, 0.0)) as body, pytest.raises(InvalidValueError, match="top"):
         body.load(Cargo(), (1.0, 0.0))
     with pytest.raises(InvalidValueError):
         Cargo(mass=0.0)
