@@ -69,7 +69,7 @@ RecordedRobot: TypeAlias = Annotated[
     ),
 ]
 BodyName: TypeAlias = Annotated[
-    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, exact or another of its own.")
+    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, ideal or another of its own.")
 ]
 ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
 """Unless others are asked for."""

@@ -44,13 +44,11 @@ from interfaces.system import software
 from robots.robot import USUAL, HeadCamera, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
-from vrs.model import home
 
 if TYPE_CHECKING:
     from contextlib import AbstractAsyncContextManager
 
     from interfaces.link import LinkConditions
-    from interfaces.runtime.live.mobile_operator import LiveMobileOperator
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
@@ -187,9 +185,8 @@ def serve(
     allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
     check_taken(robot, ctx)
-    place = None
+    place = room_of(room)
     if robot.is_base:
-        place = room_of(room)
         if jobs.exists() and not jobs.is_file():
             raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
         makes(architecture)
@@ -251,8 +248,8 @@ class _Serving:
     options: tuple[str, ...]
     """Of the robot that is started."""
     until_eof: bool
-    room: Room | None
-    """Where a mobile robot drives; None for an arm."""
+    room: Room
+    """Where a mobile robot drives."""
     jobs: Path
     """Where its list of jobs is kept."""
     camera: float
@@ -298,10 +295,10 @@ async def _serve(serving: _Serving, access: Access) -> None:
         lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options, lost.set_result))
         stack.push_async_callback(abandon, robot)
-        await asyncio.to_thread(_load, served)
+        await asyncio.to_thread(_load)
 
         from interfaces.messages.control import Role
-        from interfaces.runtime.live.operator import LiveOperator
+        from interfaces.runtime.live.twins import ArmTwins
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -312,19 +309,20 @@ async def _serve(serving: _Serving, access: Access) -> None:
         from interfaces.val2.tcp import TcpTerminalServer
         from robots.onboard.lease import LeaseState
 
-        operator = _mobile_operator(serving, access) if served.is_base else _operator(serving, access)
+        operator = _operator(serving, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
         station = _station(serving)
         routes = [*operator.routes]
         parts: list[AbstractAsyncContextManager[object]] = [operator.running()]
-        if isinstance(operator, LiveOperator):
-            recordings = Recordings(operator, Shelf(serving.recordings, served), access, **serving.recorded())
+        if operator.recording is not None:
+            shelf = Shelf(serving.recordings, served)
+            recordings = Recordings(operator.recording, operator.clock, shelf, access, **serving.recorded())
             routes += recordings.routes
             parts.append(recordings.running())
         if val is not None:
-            assert isinstance(operator, LiveOperator)
+            assert isinstance(operator.twins, ArmTwins)
             client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
-            room = served_room(client, operator.operator, val.files, software())
+            room = served_room(client, operator.twins.operator, val.files, software())
             routes.append(PageTerminalServer(room, access).route)
         app = application([*routes, *station.routes], serving.allowed(port))
         for part in (station.running(), sockets.serve(app, listening), *parts):
@@ -355,53 +353,37 @@ async def _serve(serving: _Serving, access: Access) -> None:
 
 
 def _operator(serving: _Serving, access: Access) -> LiveOperator:
-    """Make the operator's site of an arm."""
+    """Make the operator's site."""
+    from interfaces.jobs import JobFile
+    from interfaces.media import CameraConfig
     from interfaces.recording.live import LiveRecording
     from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+    from interfaces.val2.val_arm import lasts
 
     record = serving.record
     config = LiveOperatorConfig(
-        serving.robot, home(serving.robot.arm), "", serving.conditions, serving.robot_token, serving.seed,
-        server=software(), link_loss=serving.link_loss,
+        serving.robot, "", serving.conditions, serving.robot_token, serving.seed, software(), serving.link_loss,
         recording=None if record is None else LiveRecording(record, **serving.recorded()),
+        room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
+        camera=CameraConfig(serving.camera) if serving.camera else None,
     )  # fmt: skip
     return LiveOperator(config, access)
-
-
-def _mobile_operator(serving: _Serving, access: Access) -> LiveMobileOperator:
-    """Make the operator's site of a mobile robot."""
-    from interfaces.jobs import JobFile
-    from interfaces.media import CameraConfig
-    from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
-    from interfaces.val2.val_arm import lasts
-
-    assert serving.room is not None
-    config = LiveMobileOperatorConfig(
-        serving.robot, serving.room, "", serving.conditions, serving.robot_token, serving.seed, software(),
-        JobFile(serving.jobs), CameraConfig(serving.camera) if serving.camera else None, serving.link_loss, lasts,
-    )  # fmt: skip
-    return LiveMobileOperator(config, access)
 
 
 def _station(serving: _Serving) -> Station:
     """Make the page."""
     from interfaces.station.chain import described
     from interfaces.station.page import Station
-    from interfaces.station.panels import MOBILE_PANELS, PANELS
+    from interfaces.station.panels import Offer, panels_of
 
     robot = serving.robot
-    if robot.is_base:
-        panels = tuple(panel for panel in MOBILE_PANELS if serving.camera or panel.name != "camera")
-        return Station({"mobile": True, "name": robot.name}, panels=panels)
-    panels = tuple(panel for panel in PANELS if serving.val is not None or panel.name != "terminal")
-    return Station(described(robot.arm, robot.tool), panels=panels)
+    offers = {Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS, Offer.RECORDINGS}
+    offers |= {Offer.CAMERA} if serving.camera else set()
+    offers |= {Offer.TERMINALS} if serving.val is not None else set()
+    return Station(described(robot), panels_of(offers))
 
 
-def _load(robot: Robot) -> None:
+def _load() -> None:
     """Import what takes long, while the robot's process does the same."""
-    import interfaces.station.page
-
-    if robot.is_base:
-        import interfaces.runtime.live.mobile_operator
-    else:
-        import interfaces.runtime.live.operator  # noqa: F401
+    import interfaces.runtime.live.operator
+    import interfaces.station.page  # noqa: F401

@@ -38,7 +38,8 @@ class LocalClient:
     def state(self) -> control.State | None:
         """The real robot, as all clients are told."""
         _, state = self._hub.news.get(control.State, (0, None))
-        return state if isinstance(state, control.State) else None
+        assert state is None or isinstance(state, control.State)
+        return state
 
     @property
     def lease(self) -> control.Lease:

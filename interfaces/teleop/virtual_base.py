@@ -24,17 +24,19 @@ from interfaces.messages.drive_sites import (
     arc_rows,
 )
 from interfaces.messages.fields import Epoch
+from interfaces.messages.recording import CommandRecord
+from interfaces.messages.sites import Sample
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.deviation import Deviation, PathDeviation
 from interfaces.teleop.halt import Halt, HaltCause, not_following
-from interfaces.teleop.operator import OperatorSite, VirtualRobot
+from interfaces.teleop.operator import Correction, OperatorSite, VirtualRobot
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from vrs.checks import finite, normal
 from vrs.engine import MobileEngine
 from vrs.mobile import MobileModel
 from vrs.mobile.model import braking
-from vrs.model import Array
+from vrs.model import Array, frozen_array
 from vrs.segment import ArcSegment
 
 MOVING: Final = "the robot isn't at rest yet"
@@ -80,6 +82,8 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         """How far the real robot is with what it does by itself; None before it has said."""
         self.sight: SensedPoints | None = None
         """What it saw last."""
+        self.estimating = False
+        """Whether the real robot's architecture has a posture estimator, see `ESTIMATING`."""
         self._errands: Outgoing[Errand] = Outgoing()
         self._later: tuple[tuple[float, tuple[RobotTask, ...]], ...] = ()
         """What it's to be told when the next drive has begun, and when that was given [s]."""
@@ -96,10 +100,21 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         self.began, self.start = now, posture
         self.steps = self._over = 0
         self.architecture = ArchitectureOperatorSite(
-            self._model, posture, Transport.DATAGRAMS, surroundings=self._around(posture)
+            self._model, posture, Transport.DATAGRAMS, start=now, surroundings=self._around(posture)
         )
-        self.path = PathDeviation(0.0, posture)
+        self.architecture.listener = self._told
+        self.path = PathDeviation(now, posture)
         self.deviation = None
+
+    def _told(self, deed: CommandRecord) -> None:
+        self._site.inform(lambda listener: listener.commanded(deed))
+
+    def _put(self, posture: Posture, now: float, reason: str) -> None:
+        """Begin a drive at a posture where the real robot is, and tell of it."""
+        error = np.subtract(self.virtual(now), posture)
+        self._set(posture, now)
+        correction, truth = Correction(now, now, frozen_array(error), reason), self.engine.timeline
+        self._site.inform(lambda listener: listener.corrected(correction, truth))
 
     @override
     def join(self, site: OperatorSite[VirtualBase]) -> None:
@@ -108,7 +123,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     @property
     @override
     def engine(self) -> MobileEngine:
-        """What the commands of this drive make; its time begins with the drive."""
+        """What the commands of this drive make; the next drive has another one."""
         return self.architecture.engine
 
     @property
@@ -219,7 +234,9 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @override
     def shown(self, *, now: float) -> Array:
-        return np.array(self.virtual(now))
+        """Where it's drawn: where the posture estimator has it, in an architecture that has one."""
+        doing = self._site.report is not None and self._site.report.doing is not Doing.NOTHING
+        return np.array(self.architecture.estimated(now) if self.estimating and not doing else self.virtual(now))
 
     @override
     def restart(self, *, now: float) -> str:
@@ -237,7 +254,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         site.begin()
         self.epochs += 1
         self._wish, self._until = STAND, -math.inf
-        self._set(report.posture, now)
+        self._put(report.posture, now, "a drive begins where the real robot stands")
         later, self._later = self._later, ()
         for given, tasks in later:
             if now <= given + WAITS:
@@ -255,13 +272,13 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         site = self._site
         self._now = now
         packet: ArcPacket | None = None
-        while now >= self._due - 1e-9:
+        while now >= self.next_t - 1e-9:
             packet = self._step()
         if packet is None:
             if (not site.halted or self._over) and not self._prompt:
                 return None
             # That a drive is over is said at once.
-            packet = ArcPacket((), 0.0)
+            packet = ArcPacket((), self.began)
         behind = site.report is not None and (site.report.epoch or 0) < site.epoch
         if site.cause in {None, HaltCause.BY_ITSELF} and site.report is not None and behind:
             usual = site.round_trips.quantile(0.95) or 0.0
@@ -280,34 +297,30 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
             number=number,
             sent_at=now,
             began=self.began,
-            complete_until=packet.complete_until,
+            complete_until=packet.complete_until - self.began,
             start=None if start is None else Posture(*map(normal, start)),
-            runs=tuple((first, arc_rows(arcs)) for first, arcs in packet.runs),
-            tail=arc_rows(packet.tail),
+            runs=tuple((first, arc_rows(arcs, self.began)) for first, arcs in packet.runs),
+            tail=arc_rows(packet.tail, self.began),
             errands=tuple(islice(self._errands.waiting.values(), ERRANDS)),
         )
 
     @property
     def next_t(self) -> float:
-        """Time of the next command, from the drive's beginning [s]: what surrounds the virtual robot goes by it."""
-        return self.steps * self._model.period
-
-    @property
-    def _due(self) -> float:
-        return self.began + self.next_t
+        """Time of the next command [s]: what surrounds the virtual robot goes by it."""
+        return self.began + self.steps * self._model.period
 
     def _step(self) -> ArcPacket:
         """One command; of a drive that's over the virtual robot only comes to rest."""
         t = self.next_t
-        wished = self._wish if self.began + t < self._until else self._braked()
+        wished = self._wish if t < self._until else self._braked()
         self.steps += 1
         if self._site.halted and self.stands:
-            return ArcPacket((), 0.0)
+            return ArcPacket((), self.began)
         packet = self.architecture.drive(wished.v, wished.w, now=t)
         v, w = self.architecture.before
         x, y, theta = self.engine.posture(t).tolist()
         self.path.add(ArcSegment(t, self._model.period, (x, y, theta), v, w))
-        return ArcPacket((), 0.0) if self._site.halted else packet
+        return ArcPacket((), self.began) if self._site.halted else packet
 
     def _braked(self) -> Drive:
         """The next command on the way to rest, along the arc."""
@@ -316,14 +329,21 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @override
     def next_deadline(self) -> float:
-        return self._due
+        return self.next_t
 
     @override
     def hear(self, report: DriveReport, *, new: bool, now: float) -> bool:
-        if new and self._site.report is None:
-            self._set(report.posture, now)
-            self._site.halted = Halt(HaltCause.FREE)
-        return new
+        site, known = self._site, self._site.report
+        if not new:
+            return False
+        if known is None:
+            self._put(report.posture, now, "the real robot has been met")
+            site.halted = Halt(HaltCause.FREE)
+        if known is None or report.measured_at > known.measured_at:
+            play = report.measured_at if report.play is None else self.began + report.play
+            sample = Sample(0, report.measured_at, play, frozen_array(report.posture))
+            site.inform(lambda listener: listener.measured((sample,), now=now))
+        return True
 
     @override
     def take(self, report: DriveReport, *, now: float) -> None:
@@ -346,14 +366,14 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
                 site.halted = Halt(HaltCause.STOPPED)
         elif report.report is not None:
             self.architecture.receive(report.report, now=self.next_t)
-            self.deviation = self.path.match(report.posture, report.measured_at - self.began)
+            self.deviation = self.path.match(report.posture, report.measured_at)
 
     def virtual(self, now: float) -> Posture:
         """Where the virtual robot is [s]; of one that drives by itself, where it takes itself to be."""
         report = self._site.report
         if report is not None and report.doing is not Doing.NOTHING:
             return report.posture
-        return Posture(*self.engine.timeline.sample(now - self.began).tolist())
+        return Posture(*self.engine.timeline.sample(now).tolist())
 
 
 DriveLine: TypeAlias = SiteLine[OperatorSite[VirtualBase], DriveOrders, DriveReport]

@@ -41,7 +41,7 @@ async def recorded(url, path, told):
     listening = sockets.bind("127.0.0.1", 0)
     link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.03")))
     recording = LiveRecording(path, "adaptive", "hold", told.append)
-    config = LiveOperatorConfig(ROBOT, NOMINAL, url, link, recording=recording)
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, recording=recording)
     operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], listening.getsockname()[1]))
     async with sockets.serve(app, listening), operator.running():
@@ -56,17 +56,17 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
 
     async def main():
         async with robot_here() as (_, url), recorded(url, path, told) as live:
-            site, clock = live.operator, live.clock
+            virtual, clock = live.operator.robot, live.clock
             heard = live.operator.listener.reported
             live.operator.listener.reported = lambda r, *, now: (reports.append(r), heard(r, now=now))
-            site.execute(MotionCommand(JointTarget(READY)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY)), now=clock.now())
             await asyncio.sleep(0.3)
-            site.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
-            site.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
+            virtual.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
             await asyncio.sleep(0.1)
-            site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
-            site.undo(now=clock.now())
-            await until(lambda: set(site.receipts) >= {1, 3, 4})
+            virtual.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
+            virtual.undo(now=clock.now())
+            await until(lambda: set(virtual.receipts) >= {1, 3, 4})
             live.emulation.impair(
                 Impair(1, 1, DirectionConditions("constant:0.03", "0", "in-order")), "Ada", now=clock.now()
             )
@@ -77,7 +77,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             assert (health["file"], health["dropped"], health["problem"]) == (str(path), 0, None)
             # The block that's open, a turn of the recorder's thread and one of the site's, on a busy machine.
             assert health["written_s"] > clock.now() - 1.5
-            return site.engine.timeline, site.engine.receipts
+            return virtual.engine.timeline, virtual.engine.receipts
 
     timeline, receipts = asyncio.run(main())
     assert told == []
@@ -104,7 +104,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         (rerouted,) = [event.text for event in recording.events if event.kind == "rerouted"]
         assert rerouted.startswith("Ada changed the way to the robot: delay constant:0.03, loss 0, in-order; back ")
         found, value = figures(recording), summary(recording)
-        assert found.missing == ()
+        assert found.missing == []
         assert value["errors"]["servo"]["tool_max_m"] < 1e-9
         assert value["commands"]["virtual"] == {"accepted": 3, "postponed": 0, "rejected": 1}
         assert value["messages"]["delay_mean_s"] == 0.03
@@ -169,7 +169,7 @@ def alone(path, way=None):
     """A recorder of an operator's site whose robot is far away."""
     link = LinkConditions() if way is None else LinkConditions.symmetric(way)
     line = RobotLine(OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), link, np.random.default_rng(0))
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8)
     recorder.open()
     return recorder, line
 
@@ -216,7 +216,7 @@ def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
     line.operator.robot.execute(MotionCommand(JointTarget(READY)), now=0.0)
     line.advance(now=0.1)
     path = tmp_path / "live.mcap"
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8, now=60.0)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8, now=60.0)
     assert recorder.health()["written_s"] == 60.0
     recorder.open()
     line.operator.robot.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)
