@@ -88,7 +88,7 @@ async def live(seed: int) -> tuple[float, ...]:
         await robot.ready()
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(PROFILE)))
         at = f"ws://127.0.0.1:{port}/site"
-        operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, at, way, seed=seed), Access(free=OPEN))
+        operator = LiveOperator(LiveOperatorConfig(ROBOT, at, way, seed=seed, q=NOMINAL), Access(free=OPEN))
         await stack.enter_async_context(operator.running())
         site, clock = operator.operator, operator.clock
         async with asyncio.timeout(20):

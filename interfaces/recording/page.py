@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Final, Literal
 
 import msgspec
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
@@ -73,7 +73,6 @@ class ReplayPage:
         playback: Playback,
         clock: Clock,
         *,
-        admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         first: Callable[[float], None] | None = None,
         board: Newest | None = None,
@@ -84,7 +83,6 @@ class ReplayPage:
         Args:
             playback: What is played.
             clock: The user's.
-            admit: See `Viewers`.
             authorize: See `Viewers`.
             first: Called with the user's time [s] when the first page is there.
             board: What pages look at already; one of its own unless given.
@@ -99,9 +97,9 @@ class ReplayPage:
         self._marked = float("-inf")
         self._versions: list[tuple[int, tuple[float, float]] | None] = [None] * len(playback.tracks)
         self._put("recordings", {"kind": "recordings", "items": _recordings(playback)})
-        self.viewers = tuple(Viewers(scene, admit, authorize) for scene in self.scenes)
+        self.viewers = tuple(Viewers(scene, authorize) for scene in self.scenes)
         """Of each scene."""
-        board_viewers = Viewers(self.board, admit, authorize, hear=self.hear, most_heard=MOST_HEARD)
+        board_viewers = Viewers(self.board, authorize, hear=self.hear, most_heard=MOST_HEARD)
         self._routes: list[BaseRoute] = [
             Route("/", _to_page),
             *page_files(),

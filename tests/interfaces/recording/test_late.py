@@ -175,17 +175,17 @@ def test_a_live_site_is_recorded_on_the_fly(tmp_path):
             await until(lambda: site.report.epoch == site.epoch)
             first = site.robot.execute(MotionCommand(JointTarget(READY), speed=0.4), now=clock.now())
             await until(lambda: clock.now() > first.execute_at + 0.2)
-            await live.begin_recording(what)
+            await live.recording.begin(what)
             with pytest.raises(InvalidValueError, match="once the other one has ended"):
-                await live.begin_recording(replace(what, path=tmp_path / "other.mcap"))
+                await live.recording.begin(replace(what, path=tmp_path / "other.mcap"))
             site.robot.execute(MotionCommand(JointTarget(NOMINAL)), now=clock.now())
             await until(lambda: clock.now() > site.robot.engine.timeline.end + 0.3)
-            assert await live.end_recording() is None
-            assert await live.end_recording() is None
+            assert await live.recording.end() is None
+            assert await live.recording.end() is None
             with pytest.raises(RecordingError, match="none is written over"):
-                await live.begin_recording(what)
+                await live.recording.begin(what)
             # Another one, which the end of the server closes.
-            await live.begin_recording(replace(what, path=tmp_path / "more.mcap"))
+            await live.recording.begin(replace(what, path=tmp_path / "more.mcap"))
             await asyncio.sleep(0.3)
             return first, site.robot.engine.timeline
 

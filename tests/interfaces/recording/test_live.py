@@ -41,7 +41,7 @@ async def recorded(url, path, told):
     listening = sockets.bind("127.0.0.1", 0)
     link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.03")))
     recording = LiveRecording(path, "adaptive", "hold", told.append)
-    config = LiveOperatorConfig(ROBOT, NOMINAL, url, link, recording=recording)
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, recording=recording)
     operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], listening.getsockname()[1]))
     async with sockets.serve(app, listening), operator.running():

@@ -10,19 +10,14 @@ import numpy as np
 from interfaces.jobs import ArmControl, RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, controller
+from interfaces.teleop.autonomy import Autonomy, Hands, JourneyPilot
 from interfaces.teleop.connection import HostConfig
-from interfaces.teleop.driving import (
-    Autonomy,
-    DrivenConfig,
-    DrivenHost,
-    DrivenRobot,
-    Hands,
-    JourneyPilot,
-)
+from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots import ipr
+from robots.ipr.chassis import IPR
 from robots.ipr.position import FusedPosition
 from robots.ipr.robot import BareBody
 from robots.onboard import WatchdogConfig
@@ -51,7 +46,7 @@ class Rig:
         arm: ArmControl | None = None,
     ) -> None:
         self.k = 0
-        self.body = BareBody("ipr", (1.0, 2.0, 0.5), rng=3)
+        self.body = BareBody(IPR, (1.0, 2.0, 0.5), rng=3)
         self.position = FusedPosition(self.body)
         self.architecture = architecture
         watchdog = None if hold else WatchdogConfig(max_uncertainty=1.0)
@@ -72,8 +67,10 @@ class Rig:
         self.drives: list[tuple[float, float]] = []
         """What the body was told, a control period each."""
 
-    def _site(self, t: float) -> DrivenRobot:
-        return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy)
+    def _site(self, t: float) -> FollowingBase:
+        return FollowingBase(
+            self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy
+        )
 
     def _made(self, start: Posture, since: float) -> ArchitectureRobotSite:
         assert since >= 0.0
@@ -86,7 +83,7 @@ class Rig:
         return self.k * TURN
 
     @property
-    def robot(self) -> DrivenRobot:
+    def robot(self) -> FollowingBase:
         assert self.host.site is not None
         return self.host.site
 

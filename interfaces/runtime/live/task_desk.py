@@ -6,9 +6,10 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from msgspec.structs import replace
+from typing_extensions import override
 
 from interfaces.jobs import JobFile, JobRunner, carried_over, digest, dry_run, written_jobs
 from interfaces.jobs.runner import EMPTY, RUNS
@@ -20,10 +21,12 @@ from interfaces.messages.jobs import (
     Forecast,
     JobList,
     ListCommand,
+    OperatorLoss,
     Progress,
 )
 from interfaces.messages.mobile import Plan, Seen, Tasks
-from interfaces.stream.session import News
+from interfaces.runtime.live.devices import OperatorDevice
+from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
@@ -45,8 +48,10 @@ _LEFT: Final = 0.05
 _log = logging.getLogger(__name__)
 
 
-class TaskDesk:
+class TaskDesk(OperatorDevice):
     """Takes what clients want of a robot, keeps the list, and tells everybody how it is."""
+
+    name = "jobs"
 
     def __init__(
         self,
@@ -86,7 +91,7 @@ class TaskDesk:
         self._sight: SensedPoints | None = None
         self._told = Tasks()
         self._tell(self.plan())
-        self.turn()
+        self._tell_tasks()
 
     def _loaded(self) -> tuple[JobList, Progress]:
         if self._file is None:
@@ -122,7 +127,7 @@ class TaskDesk:
             return TOO_LONG
         self.jobs, self.progress, self._digest, self._forecast = jobs, progress, digest(jobs), None
         self._keep()
-        self.turn()
+        self._tell_tasks()
         return ""
 
     def _command(self, task: RobotTask, command: ListCommand) -> str:
@@ -153,7 +158,7 @@ class TaskDesk:
         forecast = await asyncio.to_thread(self._forecast_of, jobs, report.posture)
         if jobs == self.jobs:
             self._forecast = forecast
-            self.turn()
+            self._tell_tasks()
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
         if self._roads is None:
@@ -164,7 +169,11 @@ class TaskDesk:
     def _doing(self) -> Doing:
         return self._operator.robot.doing
 
-    def turn(self) -> None:
+    @override
+    def turn(self, *, now: float) -> None:
+        self._tell_tasks()
+
+    def _tell_tasks(self) -> None:
         """Take in what the robot has said, and tell everybody what is new."""
         report, sight = self._operator.robot.tasks, self._operator.robot.sight
         if report is not None and report is not self._report:
@@ -191,6 +200,16 @@ class TaskDesk:
         way = report.journey, report.reason, report.goal, report.route, left
         listed = self.jobs, self.progress, self._forecast
         return Tasks(self._doing, *way, *listed, loss, report.shows, report.says, self.problem, answers)
+
+    @property
+    @override
+    def carries_on(self) -> bool:
+        tasks = self._operator.robot.tasks
+        return self._doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
+
+    @override
+    def health(self) -> dict[str, Any]:
+        return {"stage": self.progress.stage, "problem": self.problem}
 
     def _keep(self) -> None:
         """Save the list."""
