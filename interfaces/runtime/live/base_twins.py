@@ -137,6 +137,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
     @override
     def state(self, number: int, *, connected: bool, now: float) -> Postures:
         operator, virtual, report = self.operator, self.operator.robot, self.operator.report
+        driven, drawn = virtual.virtual(now), Posture(*virtual.shown(now=now).tolist())
         real: dict[str, Any] = {}
         if report is not None:
             real = {"t": report.measured_at, "real": report.posture, "drive": report.drive, "D": report.D}
@@ -147,7 +148,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
         return Postures(
             number=number,
             now=now,
-            virtual=virtual.virtual(now),
+            virtual=driven,
             command=virtual.architecture.before,
             estimate=Posture(*virtual.architecture.estimator.posture.tolist()),
             connected=connected,
@@ -155,6 +156,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
             drives=virtual.epochs,
             round_trip=operator.round_trip,
             messages=self.line.messages()[-MOST_MESSAGES:],
+            drawn=None if drawn == driven else drawn,
             **real,
         )
 
@@ -170,11 +172,11 @@ class BaseTwins(LiveTwins[VirtualBase]):
 
     @override
     def draw(self, attached: Attached | None, *, now: float) -> None:
+        self.operator.robot.estimating = attached is not None and attached.architecture in ESTIMATING
         self._follow()
         if not self.scene.readers:
             return
         operator, virtual = self.operator, self.operator.robot
-        virtual.estimating = attached is not None and attached.architecture in ESTIMATING
         posture, t = self.stand(now)
         if operator.report is not None:
             self._measure(posture)
