@@ -531,7 +531,7 @@ function map(x, where) {
  * @property {number} [drives] count (0). How often the virtual robot was put where the real one stood: a drive begins with each lease and `Resume`, and after a stop.
  * @property {number|null} [round_trip] real (absent). As in `state`.
  * @property {Array<[number, number|null]>} [messages] up to 64 × [real, real or null] (none). As in `state`.
- * @property {Posture|null} [drawn] [`x`, `y`, `theta`] (absent). Where the virtual robot is drawn: where the posture estimator has it now; absent where that's `virtual`, as in architectures without one.
+ * @property {Posture|null} [drawn] [`x`, `y`, `theta`] (absent). Where the virtual robot is drawn, where the posture estimator has it now; absent where that's `virtual`, as in architectures without one.
  */
 /**
  * Where the robot is to go.
