@@ -211,8 +211,7 @@ def serve(
     ]  # fmt: skip
     options += [] if record is None else ["--reports", f"{RATE:g}"]
     access = access_for(host, token_file, free=OPEN)
-    own = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    val = _Val(val_port, val_files, own) if speaks_val(robot) else None
+    val = _Val(val_port, val_files) if speaks_val(robot) else None
     eye = camera if robot.device(HeadCamera) else 0.0
     serving = _Serving(
         robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye, val,
@@ -228,8 +227,6 @@ class _Val:
     port: int | None
     """Of those over TCP; None for none."""
     files: Path
-    token: str | None = field(repr=False)
-    """By which they are an operator."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -301,12 +298,14 @@ async def _serve(serving: _Serving, access: Access) -> None:
         await asyncio.to_thread(_load)
 
         from interfaces.messages.control import Role
+        from interfaces.runtime.live.twins import ArmTwins
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
+        from interfaces.stream.local import LocalClient
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageTerminalServer
-        from interfaces.val2.rooms import HOST, ServedVal
+        from interfaces.val2.rooms import HOST, served_room
         from interfaces.val2.tcp import TcpTerminalServer
         from robots.onboard.lease import LeaseState
 
@@ -321,10 +320,10 @@ async def _serve(serving: _Serving, access: Access) -> None:
             routes += recordings.routes
             parts.append(recordings.running())
         if val is not None:
-            near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
-            rooms = ServedVal(f"ws://{near}/ws", val.token, val.files, software())
-            routes.append(PageTerminalServer(rooms.enter, access).route)
-            parts.append(rooms.running())
+            assert isinstance(operator.twins, ArmTwins)
+            client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
+            room = served_room(client, operator.twins.operator, val.files, software())
+            routes.append(PageTerminalServer(room, access).route)
         app = application([*routes, *station.routes], serving.allowed(port))
         for part in (station.running(), sockets.serve(app, listening), *parts):
             await stack.enter_async_context(part)
@@ -336,7 +335,8 @@ async def _serve(serving: _Serving, access: Access) -> None:
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
-            val_door = TcpTerminalServer(await rooms.enter(), val_access)
+            await room.ready()
+            val_door = TcpTerminalServer(room, val_access)
             await stack.enter_async_context(val_door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:

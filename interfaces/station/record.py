@@ -88,7 +88,7 @@ class Recordings:
 
         self.replays = Replays(shelf, clock, allowed)
         self._board = Newest(b'{"kind":"begin"}')
-        self._viewers = Viewers(self._board, None, allowed)
+        self._viewers = Viewers(self._board, allowed)
         self._looking = asyncio.Event()
         self._asked = {role: Bucket(RATE, BURST, clock.now()) for role in Role}
         self._tickets: OrderedDict[str, tuple[Path, float]] = OrderedDict()

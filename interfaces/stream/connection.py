@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 from interfaces.clients.designer import Issued
-from interfaces.clients.viewer import ShownFrame
+from interfaces.clients.viewer import ShownFrame, Viewer
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
 from interfaces.messages.control import (
@@ -79,8 +79,6 @@ class Connection:
         """Asks for positions."""
         self.supervisor = RemoteSupervisor(self.designer, self.observer)
         """Both."""
-        self._session.add(self.designer)
-        self._session.add(self.observer)
 
     def _open(self, role: Role) -> Line:
         self._sessions.append(Line(self._url, self._client(role=role), self._clock, self._loop, self._timeout))
@@ -134,10 +132,8 @@ class Connection:
             InvalidValueError: If rate is out of range.
         """
         session = self._open(Role.VIEWER)
-        end = partial(self._end, session)
-        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), delay=delay, show=show, end=end)
-        session.add(viewer)
-        return viewer
+        make = partial(Viewer, rate=rate, form=ViewForm(form), delay=delay)
+        return RemoteViewer(session, make, partial(self._end, session), show)
 
     def acquire(self, *, wait: float = 5.0) -> Lease | Problem:
         """Ask for the lease; it's kept by itself until it's released.
@@ -178,18 +174,6 @@ class Connection:
             The lease, `shared` if it is; or why not.
         """
         return self._ask(Lease, lambda number: control.Share(number, session), wait)
-
-    def ask_to_share(self, session: str) -> int:
-        """As `share`, without waiting; the number for `answer`."""
-        core = self._session.core
-        return self._session.do(
-            lambda _: core.wish(lambda number: control.Share(number, session), now=self._clock.now())
-        )
-
-    def answer(self, number: int) -> Lease | Problem | None:
-        """What the server answered to `ask_to_share`; None while it hasn't."""
-        answer = self._session.core.answer(number)
-        return None if answer is None else _expected(Lease, answer)
 
     def release(self, *, wait: float = 5.0) -> Lease | Problem:
         """Give the lease back, and the robot stops; or the share, without a stop."""
@@ -283,10 +267,20 @@ class Connection:
     def _epoch(self) -> Epoch:
         return Epoch(self._session.core.epoch)
 
+    def ask(self, ask: Ask, *, leased: bool = False) -> int:
+        """Ask something of the lease without waiting for the answer; the number of what was asked.
+
+        Args:
+            ask: Makes the message, of its number.
+            leased: Whether only who has the lease may ask that.
+        """
+        core = self._session.core
+        return self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+
     def _ask(self, kind: type[A], ask: Ask, wait: float, *, leased: bool = False) -> A | Problem:
         """What the server answers to a wish, of a kind, or why not; see `ClientCore.wish`."""
         core = self._session.core
-        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+        number = self.ask(ask, leased=leased)
         self._session.wait(lambda: core.answer(number) is not None, wait)
         missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
         return _expected(kind, core.answer(number) or missing)

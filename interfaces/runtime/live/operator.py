@@ -132,7 +132,7 @@ class LiveOperator(LeasedRobot, Workers):
             self.devices = self.desk, media
         else:
             self.recording = SiteRecording(
-                config.recording, twins.line, which, self.clock, lambda: self.robot.connected, seed=config.seed
+                config.recording, twins.line, self.clock, lambda: self.robot.connected, seed=config.seed
             )
             self.devices = (self.recording,)
         self._wants_resume = False

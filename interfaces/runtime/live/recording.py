@@ -13,7 +13,6 @@ from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN, LiveRecorder, LiveRecording
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.teleop import RobotLine
-from robots.robot import Robot
 from vrs.clock import Clock, seconds_since_1970
 from vrs.errors import InvalidValueError
 
@@ -27,7 +26,6 @@ class SiteRecording(OperatorDevice):
         self,
         first: LiveRecording | None,
         line: RobotLine,
-        robot: Robot,
         clock: Clock,
         connected: Callable[[], bool],
         *,
@@ -38,7 +36,6 @@ class SiteRecording(OperatorDevice):
         Args:
             first: What is recorded from now on; None for nothing.
             line: From the operator's site to the robot.
-            robot: Which robot.
             clock: Session time.
             connected: Whether the robot is heard of.
             seed: Of the emulated link.
@@ -46,7 +43,7 @@ class SiteRecording(OperatorDevice):
         Raises:
             RecordingError: If the file can't be made.
         """
-        self._line, self._robot, self._clock, self._connected, self._seed = line, robot, clock, connected, seed
+        self._line, self._clock, self._connected, self._seed = line, clock, connected, seed
         self.recorder: LiveRecorder | None = None
         """Of what is recorded now; None while nothing is."""
         self._task: asyncio.Task[None] | None = None
@@ -56,7 +53,7 @@ class SiteRecording(OperatorDevice):
             self.recorder.open()
 
     def _made(self, what: LiveRecording, *, began: float, now: float) -> LiveRecorder:
-        return LiveRecorder(what, self._line, self._robot.arm, seed=self._seed, began=began, now=now)
+        return LiveRecorder(what, self._line, seed=self._seed, began=began, now=now)
 
     @override
     @contextlib.asynccontextmanager

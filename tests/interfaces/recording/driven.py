@@ -28,9 +28,7 @@ class Driven:
         self.line = RobotLine(self.operator, way, np.random.default_rng(seed))
         self.line.connected = True
         self.robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(beat=beat))
-        self.recorder = LiveRecorder(
-            LiveRecording(path, "adaptive", "hold"), self.line, MODEL, seed=seed, began=5e8
-        )
+        self.recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), self.line, seed=seed, began=5e8)
         self.recorder.open()
         self.now = 0.0
         self.cut = False

@@ -63,7 +63,7 @@ class Sitting:
     def __init__(self, path: Path, seed: int) -> None:
         self.clock = 0.0
         self.site = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-        self.capture = Capture(self.site, MODEL, now=0.0, step=0.02, every=True)
+        self.capture = self.site.listener = Capture(self.site.robot.engine, now=0.0, step=0.02, every=True)
         begin = Begin(
             t=0.0, robot="puma560", driver="laboratory", title="sitting", seed=seed, delay="none",
             offset="adaptive", service="datagram", link_loss="hold", step=0.02, q=NOMINAL.tolist(),
@@ -86,7 +86,7 @@ class Sitting:
             self.clock += self._draws.pause(self.site.robot.engine)
             if self.site.halted:
                 self.site.resume(now=self.clock)
-            self.capture.advance(now=self.clock)
+            self.capture.sample(now=self.clock)
             self.capture.write_out()
 
     def tell(self, command=..., /) -> None:
@@ -132,7 +132,7 @@ class Sitting:
 
     def end(self) -> None:
         """Close the file."""
-        self.capture.advance(now=self.clock)
+        self.capture.sample(now=self.clock)
         self.capture.receipts(self.clock, "virtual", self.site.robot.engine.receipts)
         self.capture.whole(self.clock)
         self.capture.write_out()

@@ -272,9 +272,9 @@ def test_what_later_commands_made_of_receipts_is_in_a_cut_file_too(tmp_path):
     for k in range(70):
         made.clock = 0.01 * k
         made.tell(MotionCommand(JointTarget(NOMINAL + 0.05 * (k % 3)), execute_at=10.0 + 2.0 * k))
-        made.capture.advance(now=made.clock)
+        made.capture.sample(now=made.clock)
     made.tell(MotionCommand(JointTarget(NOMINAL), execute_at=140.0))
-    made.capture.advance(now=made.clock)
+    made.capture.sample(now=made.clock)
     made.capture.write_out()
     made.writer.flush()
     made.writer.abandon()

@@ -115,7 +115,7 @@ def test_what_other_runs_said_comes_back(tmp_path):
     recorder.finish(attributions, offsets)
     with open_recording(tmp_path / "run.mcap") as recording:
         found = figures(recording)
-        assert (found.attributions, found.offsets, found.missing) == (attributions, offsets, ())
+        assert (found.attributions, found.offsets, found.missing) == (attributions, offsets, [])
         assert to_json(summary(recording)) == to_json(summarize(run, attributions, offsets))
 
 

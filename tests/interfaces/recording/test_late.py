@@ -30,7 +30,9 @@ def begin_late(sitting, path, **given):
     """Record a sitting from now on."""
     now, engine = sitting.clock, sitting.site.robot.engine
     sitting.site.robot.clock.set(now)
-    sitting.capture = capture = Capture(sitting.site, MODEL, now=now, step=0.02, every=True, **given)
+    sitting.capture = capture = sitting.site.listener = Capture(
+        sitting.site.robot.engine, now=now, step=0.02, every=True, **given
+    )
     begin = Begin(
         t=now, robot="puma560", driver="live", title="late", seed=0, delay="none", offset="adaptive",
         service="datagram", link_loss="hold", step=0.02, q=engine.joints(now).tolist(),

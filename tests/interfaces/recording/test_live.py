@@ -104,7 +104,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         (rerouted,) = [event.text for event in recording.events if event.kind == "rerouted"]
         assert rerouted.startswith("Ada changed the way to the robot: delay constant:0.03, loss 0, in-order; back ")
         found, value = figures(recording), summary(recording)
-        assert found.missing == ()
+        assert found.missing == []
         assert value["errors"]["servo"]["tool_max_m"] < 1e-9
         assert value["commands"]["virtual"] == {"accepted": 3, "postponed": 0, "rejected": 1}
         assert value["messages"]["delay_mean_s"] == 0.03
@@ -169,7 +169,7 @@ def alone(path, way=None):
     """A recorder of an operator's site whose robot is far away."""
     link = LinkConditions() if way is None else LinkConditions.symmetric(way)
     line = RobotLine(OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), link, np.random.default_rng(0))
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8)
     recorder.open()
     return recorder, line
 
@@ -216,7 +216,7 @@ def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
     line.operator.robot.execute(MotionCommand(JointTarget(READY)), now=0.0)
     line.advance(now=0.1)
     path = tmp_path / "live.mcap"
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8, now=60.0)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8, now=60.0)
     assert recorder.health()["written_s"] == 60.0
     recorder.open()
     line.operator.robot.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)

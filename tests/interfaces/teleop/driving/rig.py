@@ -23,6 +23,7 @@ from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots import ipr
+from robots.ipr.chassis import IPR
 from robots.ipr.position import FusedPosition
 from robots.ipr.robot import BareBody
 from robots.onboard import WatchdogConfig
@@ -51,7 +52,7 @@ class Rig:
         arm: ArmControl | None = None,
     ) -> None:
         self.k = 0
-        self.body = BareBody("ipr", (1.0, 2.0, 0.5), rng=3)
+        self.body = BareBody(IPR, (1.0, 2.0, 0.5), rng=3)
         self.position = FusedPosition(self.body)
         self.architecture = architecture
         watchdog = None if hold else WatchdogConfig(max_uncertainty=1.0)

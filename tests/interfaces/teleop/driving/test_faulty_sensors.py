@@ -16,7 +16,7 @@ from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import load
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import IPR, Senses
 from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
 from robots.onboard.following import SensorWatch, SoundPosition
@@ -112,7 +112,7 @@ def test_no_drive_is_made_of_it_whatever_the_architecture_reads(bad: float) -> N
 
 
 def body() -> BareBody:
-    return BareBody("ipr", room=place("furnished"), senses=Senses(laser=LaserModel()), rng=1)
+    return BareBody(IPR, room=place("furnished"), senses=Senses(laser=LaserModel()), rng=1)
 
 
 def spoil(robot: Any, name: str, bad: float) -> None:
