@@ -35,7 +35,7 @@ class Office:
         self.desk = TaskDesk(self.rig.operator, ROOM, MODEL, self.told.append, file)
 
     def run(self, seconds: float) -> None:
-        self.rig.run(seconds, lambda now: self.desk.turn(now=now))
+        self.rig.run(seconds, lambda _: self.desk.turn())
 
     def order(self, task: RobotTask) -> str:
         return self.desk.order(task)
