@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.ipr.chassis import Senses
+from robots.ipr.chassis import IPR, Senses
 from robots.ipr.navigation import BodyNavigator
 from robots.ipr.position import LaserPosition
 from robots.ipr.robot import BareBody, place
@@ -21,7 +21,7 @@ doors = [
 home = replace(home, doors=tuple(doors), people=())
 sofa = home.place("sofa")
 start = sofa.x, sofa.y, -1.57
-body = BareBody("ipr", start, room=home, senses=Senses(camera=None, laser=LaserModel()), rng=1)
+body = BareBody(IPR, start, room=home, senses=Senses(camera=None, laser=LaserModel()), rng=1)
 position, on_board = LaserPosition(body), BodyNavigator(body, PERIOD)
 journey, b, before, routes = on_board.navigator.journey, home.place("B"), STAND, 0
 while body.time < 120.0:

@@ -175,18 +175,6 @@ class Connection:
         """
         return self._ask(Lease, lambda number: control.Share(number, session), wait)
 
-    def ask_to_share(self, session: str) -> int:
-        """As `share`, without waiting; the number for `answer`."""
-        core = self._session.core
-        return self._session.do(
-            lambda _: core.wish(lambda number: control.Share(number, session), now=self._clock.now())
-        )
-
-    def answer(self, number: int) -> Lease | Problem | None:
-        """What the server answered to `ask_to_share`; None while it hasn't."""
-        answer = self._session.core.answer(number)
-        return None if answer is None else _expected(Lease, answer)
-
     def release(self, *, wait: float = 5.0) -> Lease | Problem:
         """Give the lease back, and the robot stops; or the share, without a stop."""
         return self._ask(Lease, lambda number: control.Release(number, self._epoch), wait, leased=True)
@@ -279,10 +267,20 @@ class Connection:
     def _epoch(self) -> Epoch:
         return Epoch(self._session.core.epoch)
 
+    def ask(self, ask: Ask, *, leased: bool = False) -> int:
+        """Ask something of the lease without waiting for the answer; the number of what was asked.
+
+        Args:
+            ask: Makes the message, of its number.
+            leased: Whether only who has the lease may ask that.
+        """
+        core = self._session.core
+        return self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+
     def _ask(self, kind: type[A], ask: Ask, wait: float, *, leased: bool = False) -> A | Problem:
         """What the server answers to a wish, of a kind, or why not; see `ClientCore.wish`."""
         core = self._session.core
-        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+        number = self.ask(ask, leased=leased)
         self._session.wait(lambda: core.answer(number) is not None, wait)
         missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
         return _expected(kind, core.answer(number) or missing)

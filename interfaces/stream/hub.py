@@ -459,6 +459,12 @@ class Hub:
         seat = self._seats.get(key)
         return seat is not None and seat.role is not Role.VIEWER and self.leasing.admits(seat, epoch, now)
 
+    def let_acquire(self, key: str, *, now: float) -> None:
+        """Ask for the lease in the place of a session that has a connection."""
+        seat = self._seats.get(key)
+        if seat is not None and seat in self._served:
+            self.leasing.wish(seat, control.Acquire(1), now)
+
     def stopped(self, *, now: float) -> None:
         """Say that the robot is at rest after a lease ended, and takes no command."""
         self.leasing.stopped(now=now)
@@ -589,11 +595,21 @@ class Hub:
             return ""
         return f"there are {most} clients already"
 
+    def join(self, name: str) -> SessionState:
+        """Let in a client in this process: an operator without a connection, whose lease needs no beats."""
+        return self._made(SessionState(self._key(), name, Role.OPERATOR, local=True))
+
     def _seat(self, hello: control.Hello) -> SessionState:
-        key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
-        seat = self._seats[key] = SessionState(key, hello.name, hello.role)
+        seat = self._made(SessionState(self._key(), hello.name, hello.role))
+        self._seats[seat.key] = seat
+        return seat
+
+    def _made(self, seat: SessionState) -> SessionState:
         seat.servlet = self.site.servlet(admit=lambda order: self.leasing.refusal(seat, order, self._now))
         return seat
+
+    def _key(self) -> str:
+        return base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
 
     def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcomed:
         config = self.config

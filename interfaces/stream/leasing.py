@@ -24,10 +24,10 @@ Wish: TypeAlias = (
 class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
-    __slots__ = ("key", "left", "name", "role", "servlet")
+    __slots__ = ("key", "left", "local", "name", "role", "servlet")
 
-    def __init__(self, key: str, name: str, role: Role) -> None:
-        self.key, self.name, self.role = key, name, role
+    def __init__(self, key: str, name: str, role: Role, *, local: bool = False) -> None:
+        self.key, self.name, self.role, self.local = key, name, role, local
         self.servlet: Servlet | DriveServlet
         self.left = 0.0
         """When its connection was lost [s]."""
@@ -192,7 +192,10 @@ class Leasing:
         return refusal
 
     def turn(self, now: float) -> None:
-        """Stop the robot if the lease has ended."""
+        """Stop the robot if the lease has ended; that of a holder in this process needs no beats."""
+        epoch = self.lease.epoch
+        if self.holder is not None and self.holder.local and epoch is not None:
+            self.lease.heard(epoch, now=now)
         ended = self.lease.advance(now=now)
         if ended is not None:
             self.holder, self._ended = None, ended.why

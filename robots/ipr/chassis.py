@@ -35,7 +35,7 @@ from robots.ipr.model import (
 )
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from robots.onboard.laser import LaserModel
-from vrs.checks import number_in, one_of, validated, within
+from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
@@ -273,17 +273,6 @@ The casters end 0.3 mm above the floor and the battery sits behind the axle, so 
 the weight and the robot leans on its rear caster. The paper's micro-robot has no sonars; those here see a room
 from where its overhead camera's software would.
 """
-
-CHASSES: Final = {made.kind: made for made in (IPR, MICRO)}
-
-
-def chassis(kind: str) -> Chassis:
-    """Return a chassis by its name, `ipr` or `micro`.
-
-    Raises:
-        InvalidValueError: If there's none of that name.
-    """
-    return CHASSES[one_of("kind", kind, CHASSES)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from robots.bullet.rooms import EMPTY, Room, load_room
-from robots.ipr.chassis import Chassis, MobileReality, Senses, chassis
+from robots.ipr.chassis import Chassis, MobileReality, Senses
 from robots.ipr.drive_train import DriveTrain, Odometry, as_posture
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.model import PERIOD
@@ -66,7 +66,7 @@ class MobileRobot(ABC):
 
     def __init__(
         self,
-        kind: str | Chassis = "ipr",
+        chassis: Chassis,
         posture: ArrayLike | None = None,
         *,
         room: Room | str | None = None,
@@ -79,7 +79,7 @@ class MobileRobot(ABC):
         """Put a robot into a room, at rest.
 
         Args:
-            kind: `ipr`, `micro`, or a chassis.
+            chassis: What it is.
             posture: Middle of the driving axle [m] and heading [rad], (x, y, θ); where the room says, unless given.
             room: A room, or the name of one that comes with the package; only a floor, unless given.
             reality: How real it is; everything, unless given, in steps of 1/240 s, of the bare robot 1/60 s.
@@ -91,7 +91,7 @@ class MobileRobot(ABC):
         Raises:
             InvalidValueError: If a value is out of range, or the robot would stand in something.
         """
-        self.chassis = chassis(kind) if isinstance(kind, str) else kind
+        self.chassis = chassis
         self.room = room = EMPTY if room is None else place(room) if isinstance(room, str) else room
         self.reality = reality = MobileReality(dt=self._STEP) if reality is None else reality
         self.limits = limits = self.chassis.limits if limits is None else limits

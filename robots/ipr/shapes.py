@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from robots.base import upright
 from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
-from robots.ipr.chassis import IPR, MICRO, Chassis, chassis
+from robots.ipr.chassis import IPR, MICRO, Chassis
 from robots.ipr.drive_train import as_posture
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
 from vrs.checks import finite_array
@@ -210,27 +210,35 @@ def caster(name: str, body: Chassis) -> LinkShape:
     return build.shape()
 
 
-@lru_cache(maxsize=2)
-def shapes(kind: str = "ipr") -> tuple[LinkShape, ...]:
-    """Build a robot: body, right wheel, left wheel, two casters, in the order and frames of `links`.
-
-    Raises:
-        InvalidValueError: If kind is neither `ipr` nor `micro`.
-    """
-    body = chassis(kind)
+def on_wheels(body: LinkShape, chassis: Chassis) -> tuple[LinkShape, ...]:
+    """Set a body on its wheels: body, right wheel, left wheel, two casters, in the order and frames of `links`."""
     return (
-        _ipr_body() if body is IPR else _micro_body(),
-        wheel("right wheel", body, -1),
-        wheel("left wheel", body, 1),
-        *(caster(f"caster {k + 1}", body) for k in range(len(body.casters))),
+        body,
+        wheel("right wheel", chassis, -1),
+        wheel("left wheel", chassis, 1),
+        *(caster(f"caster {k + 1}", chassis) for k in range(len(chassis.casters))),
     )
 
 
-def links(kind: str, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters: ArrayLike = (0.0, 0.0)) -> Array:
+@lru_cache(maxsize=1)
+def ipr_shapes() -> tuple[LinkShape, ...]:
+    """Build the IPR, in the order and frames of `links`."""
+    return on_wheels(_ipr_body(), IPR)
+
+
+@lru_cache(maxsize=1)
+def micro_shapes() -> tuple[LinkShape, ...]:
+    """Build the micro-robot, in the order and frames of `links`."""
+    return on_wheels(_micro_body(), MICRO)
+
+
+def links(
+    chassis: Chassis, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters: ArrayLike = (0.0, 0.0)
+) -> Array:
     """Return the poses of a robot's shapes in the world.
 
     Args:
-        kind: `ipr` or `micro`.
+        chassis: Of the robot.
         posture: x, y [m], θ [rad], (3,).
         wheels: Angles that the right and the left wheel have turned by [rad], (2,).
         casters: Where the casters' forks point, 0 behind their axes [rad], (2,).
@@ -239,9 +247,8 @@ def links(kind: str, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters
         (5, 4, 4).
 
     Raises:
-        InvalidValueError: If something isn't finite or of the wrong shape, or there's no such robot.
+        InvalidValueError: If something isn't finite or of the wrong shape.
     """
-    body = chassis(kind)
     x, y, theta = as_posture("posture", posture)
     right, left = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
     swivels = finite_array("casters", casters, (2,), "two finite angles [rad]").tolist()
@@ -249,10 +256,10 @@ def links(kind: str, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters
     poses = [X_WR]
     for angle, side in ((right, -0.5), (left, 0.5)):
         c, s = math.cos(angle), math.sin(angle)
-        y, z = side * body.wheel_base, body.wheel_radius
+        y, z = side * chassis.wheel_base, chassis.wheel_radius
         turned = np.array([[c, 0, s, 0], [0, 1, 0, y], [-s, 0, c, z], [0, 0, 0, 1.0]])
         poses.append(X_WR @ turned)
-    poses += [X_WR @ upright(*at, angle) for at, angle in zip(body.casters, swivels, strict=True)]
+    poses += [X_WR @ upright(*at, angle) for at, angle in zip(chassis.casters, swivels, strict=True)]
     return frozen_array(np.stack(poses))
 
 

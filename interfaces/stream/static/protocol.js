@@ -366,10 +366,10 @@ function checkNetwork(m) {
 /** How fast a mobile robot may be commanded, and how fast that may change. */
 function checkDriveLimits(m) {
   map(m, "DriveLimits");
-  real(m.v_max, -REAL, REAL, "DriveLimits.v_max"); // Largest linear speed [m/s], either way, positive.
-  real(m.w_max, -REAL, REAL, "DriveLimits.w_max"); // Largest angular speed [rad/s], either way, positive.
-  real(m.a_max, -REAL, REAL, "DriveLimits.a_max"); // Largest linear acceleration [m/s²], positive.
-  real(m.alpha_max, -REAL, REAL, "DriveLimits.alpha_max"); // Largest angular acceleration [rad/s²], positive.
+  real(m.v_max, 5e-324, REAL, "DriveLimits.v_max"); // Largest linear speed [m/s], either way, positive.
+  real(m.w_max, 5e-324, REAL, "DriveLimits.w_max"); // Largest angular speed [rad/s], either way, positive.
+  real(m.a_max, 5e-324, REAL, "DriveLimits.a_max"); // Largest linear acceleration [m/s²], positive.
+  real(m.alpha_max, 5e-324, REAL, "DriveLimits.alpha_max"); // Largest angular acceleration [rad/s²], positive.
   return m;
 }
 

@@ -55,7 +55,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     now = rig.now
     assert ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), now).refusal == ""
     rig.run(0.2)
-    assert rig.operator.site.before.v > 0
+    assert rig.operator.robot.architecture.before.v > 0
     assert "leave out execute_at" in ordered(servlet, 2, DriveCommand(0.3, 0.0, 0.3, execute_at=5.0), now).refusal
     assert "drive and stop" in ordered(servlet, 3, PositionQuery(), now).refusal
     assert ordered(servlet, 4, None, now).refusal
@@ -65,7 +65,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     assert "stopped" in refused.refusal
     assert refused.code is RefusalCode.NOT_FOLLOWING
     rig.run(1.0)
-    assert rig.operator.stands
+    assert rig.operator.robot.stands
 
 
 def test_who_isnt_admitted_drives_nothing() -> None:
@@ -73,7 +73,7 @@ def test_who_isnt_admitted_drives_nothing() -> None:
     servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: Refusal("no lease: acquire it first"))
     assert "no lease" in ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), rig.now).refusal
     rig.run(0.5)
-    assert rig.operator.stands
+    assert rig.operator.robot.stands
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.chassis import CHASSES, CameraModel, MobileReality, Senses, SonarModel, chassis
+from robots.ipr.chassis import IPR, MICRO, CameraModel, Chassis, MobileReality, Senses, SonarModel
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import BareBody, MobileRobot
 from robots.ipr.sensing import SonarRing
@@ -22,16 +22,16 @@ IDEAL = MobileReality.ideal(dt=1 / 60)
 QUIET = Senses(
     sonar=SonarModel(noise=0.0, noise_share=0.0, misses=0.0), camera=CameraModel(noise=0.0, noise_angle=0.0)
 )
-KINDS = sorted(CHASSES)
+KINDS = [IPR, MICRO]
 
 
 def commands(seed: int, count: int) -> Array:
     return np.random.default_rng(seed).uniform((-0.5, -0.785), (0.5, 0.785), (count, 2))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_ideal_it_is_the_virtual_robot(kind: str) -> None:
-    body = BareBody(kind, (1.0, 2.0, 0.3), reality=IDEAL)
+@pytest.mark.parametrize("chassis", KINDS, ids=lambda one: one.kind)
+def test_ideal_it_is_the_virtual_robot(chassis: Chassis) -> None:
+    body = BareBody(chassis, (1.0, 2.0, 0.3), reality=IDEAL)
     expected = np.array((1.0, 2.0, 0.3))
     for v, w in [(0.5, 0.0), (0.0, 0.785), *commands(1, 60).tolist()]:
         body.follow(v, w)
@@ -44,7 +44,7 @@ def test_ideal_it_is_the_virtual_robot(kind: str) -> None:
 def test_what_is_wrong_with_the_wheels_bends_its_way_as_worked_out() -> None:
     # Ground speeds: r (1 + e) (1 - s) times the shafts'; the base is wider.
     reality = replace(IDEAL, radius_error=(0.01, -0.02), slip=(0.03, 0.05), base_error=0.04)
-    body = BareBody("ipr", (0, 0, 0), reality=reality)
+    body = BareBody(IPR, (0, 0, 0), reality=reality)
     body.drive(0.4, 0.2, 600)
     base = 0.4
     right = (0.4 + 0.1 * base) * 1.01 * 0.97
@@ -57,7 +57,7 @@ def test_what_is_wrong_with_the_wheels_bends_its_way_as_worked_out() -> None:
 
 
 def test_speeds_change_within_the_limits_and_with_the_servos_lag() -> None:
-    body = BareBody("ipr", reality=replace(IDEAL, ramps=True))
+    body = BareBody(IPR, reality=replace(IDEAL, ramps=True))
     speeds = []
     for k in range(240):
         body.drive(0.5 if k < 120 else -0.5, 0.7 if k % 50 < 25 else -0.7)
@@ -65,7 +65,7 @@ def test_speeds_change_within_the_limits_and_with_the_servos_lag() -> None:
     change = np.abs(np.diff(np.array([(0.0, 0.0), *speeds]), axis=0)) * 60
     assert change[:, 0].max() == pytest.approx(0.52, abs=1e-9)
     assert change[:, 1].max() == pytest.approx(2 * 0.52 / 0.4, abs=1e-9)
-    lagging = BareBody("ipr", reality=replace(IDEAL, servo_lag=True))
+    lagging = BareBody(IPR, reality=replace(IDEAL, servo_lag=True))
     for k in range(1, 6):
         lagging.drive(0.5, 0.0)
         assert lagging.motion[0] == pytest.approx(0.5 * (1 - math.exp(-k / 60 / 0.03)), abs=1e-12)
@@ -75,7 +75,7 @@ def test_speeds_change_within_the_limits_and_with_the_servos_lag() -> None:
     ("v", "w"), [(0.51, 0.0), (-0.6, 0.0), (0.0, 0.79), (math.nan, 0.0), (0.0, math.inf), ("1", 0.0)]
 )
 def test_a_command_beyond_the_limits_is_refused_and_nothing_moves(v: float, w: float) -> None:
-    body = BareBody("ipr", rng=3)
+    body = BareBody(IPR, rng=3)
     body.follow(0.2, 0.1)
     before, time = body.posture.tolist(), body.time
     with pytest.raises(InvalidValueError, match=r"^(v|w) must be a number in"):
@@ -87,7 +87,7 @@ def test_a_command_beyond_the_limits_is_refused_and_nothing_moves(v: float, w: f
 @pytest.mark.parametrize("steps", [-1, 1.0, True, 2_000_000])
 def test_steps_are_counted_in_whole_numbers(steps: int) -> None:
     with pytest.raises(InvalidValueError, match="steps"):
-        BareBody().drive(0.1, 0.0, steps)
+        BareBody(IPR).drive(0.1, 0.0, steps)
 
 
 def trace(make: Callable[[], MobileRobot], parts: list[int], seed: int = 5) -> bytes:
@@ -110,7 +110,7 @@ def test_the_same_seed_gives_the_same_to_the_last_bit() -> None:
     )
 
     def made(seed: int) -> Callable[[], MobileRobot]:
-        return lambda: BareBody("ipr", room=narrow, rng=seed)
+        return lambda: BareBody(IPR, room=narrow, rng=seed)
 
     first = trace(made(1), [24])
     assert trace(made(1), [24]) == first
@@ -123,7 +123,7 @@ def test_a_collision_is_the_same_however_calls_are_split() -> None:
     room = read_room("room 1\nsize 4 4\nwall 3 0 3 4\n")
     ends = set()
     for parts in ([300], [1] * 300, [3, 150, 147]):
-        body = BareBody("ipr", (2.4, 2.0, 0.1), room=room, reality=replace(IDEAL, dt=1 / 240))
+        body = BareBody(IPR, (2.4, 2.0, 0.1), room=room, reality=replace(IDEAL, dt=1 / 240))
         for steps in parts:
             body.drive(0.5, 0.1, steps)
         assert body.touching
@@ -133,7 +133,7 @@ def test_a_collision_is_the_same_however_calls_are_split() -> None:
 
 def test_one_sense_switched_off_leaves_the_others_as_they_were() -> None:
     def told(senses: Senses) -> tuple[bytes, bytes, bytes]:
-        body = BareBody("ipr", room="furnished", rng=4, senses=senses)
+        body = BareBody(IPR, room="furnished", rng=4, senses=senses)
         for v, w in (0.3 * commands(2, 30)).tolist():
             body.follow(v, w)
         scan, fix = body.sonar, body.camera
@@ -150,7 +150,7 @@ def test_one_sense_switched_off_leaves_the_others_as_they_were() -> None:
 
 def test_it_stands_where_the_way_leads_into_a_wall_and_its_wheels_turn() -> None:
     room = read_room("room 1\nsize 4 4\nwall 3 0 3 4\n")
-    body = BareBody("ipr", (1.0, 2.0, 0.0), room=room, reality=replace(IDEAL, ramps=True))
+    body = BareBody(IPR, (1.0, 2.0, 0.0), room=room, reality=replace(IDEAL, ramps=True))
     body.drive(0.5, 0.0, 60 * 10)
     # The front is half the length before the body's middle, which is behind the axle.
     stop = 2.95 - (0.26 - 0.06)
@@ -163,7 +163,7 @@ def test_it_stands_where_the_way_leads_into_a_wall_and_its_wheels_turn() -> None
     assert body.touching == ""
     assert body.posture[0] < stop - 0.2
     with pytest.raises(InvalidValueError, match="not in the wall in line 3"):
-        BareBody("ipr", (3.0, 2.0, 0.0), room=room)
+        BareBody(IPR, (3.0, 2.0, 0.0), room=room)
 
 
 @pytest.mark.parametrize("person", ["", "person 0.2 0,4.5,3.5 5,1.5,1 9,4.5,3.5\n"])
@@ -172,7 +172,7 @@ def test_no_touch_is_missed_however_the_robot_goes(person: str) -> None:
     room = read_room(plan + person)
     collisions = 0
     for seed in range(6):
-        body = BareBody("ipr", (0.8, 0.8, 0.25 * seed), room=room, rng=seed)
+        body = BareBody(IPR, (0.8, 0.8, 0.25 * seed), room=room, rng=seed)
         seen = FloorPlan(room)
         for v, w in np.repeat(commands(seed, 15), 12, axis=0).tolist():
             body.follow(0.3 + 0.4 * abs(v), 0.2 * w)
@@ -186,7 +186,7 @@ def test_no_touch_is_missed_however_the_robot_goes(person: str) -> None:
 
 def test_sonars_tell_the_room() -> None:
     room = read_room("room 1\nsize 6 4\nwall 0 0 6 0\nwall 6 0 6 4\nwall 6 4 0 4\nwall 0 4 0 0\n")
-    body = BareBody("ipr", (3.06, 2.0, 0.0), room=room, senses=QUIET)
+    body = BareBody(IPR, (3.06, 2.0, 0.0), room=room, senses=QUIET)
     body.drive(0.0, 0.0, 1)
     scan = body.sonar
     assert scan is not None
@@ -198,7 +198,7 @@ def test_sonars_tell_the_room() -> None:
     body.drive(0.0, 0.0, 5)
     assert body.sonar is not None
     assert body.sonar.time == pytest.approx(0.1, abs=1e-12)
-    far = BareBody("ipr", (3.06, 2.0, 0.0), senses=QUIET)
+    far = BareBody(IPR, (3.06, 2.0, 0.0), senses=QUIET)
     far.drive(0.0, 0.0, 1)
     assert far.sonar is not None
     assert np.isinf(far.sonar.ranges).all()
@@ -207,7 +207,7 @@ def test_sonars_tell_the_room() -> None:
 def test_noise_and_misses_are_as_said() -> None:
     room = read_room("room 1\nsize 6 4\nwall 0 0 6 0\nwall 6 0 6 4\nwall 6 4 0 4\nwall 0 4 0 0\n")
     model = SonarModel(rate=60.0, noise=0.01, noise_share=0.02, misses=0.1)
-    body = BareBody("ipr", (3.06, 2.0, 0.0), room=room, senses=Senses(model, CameraModel(rate=60.0)), rng=6)
+    body = BareBody(IPR, (3.06, 2.0, 0.0), room=room, senses=Senses(model, CameraModel(rate=60.0)), rng=6)
     ranges, fixes = [], []
     for _ in range(2000):
         body.drive(0.0, 0.0, 1)
@@ -226,7 +226,7 @@ def test_noise_and_misses_are_as_said() -> None:
 
 
 def test_encoders_count_with_noise_and_odometry_drifts() -> None:
-    body = BareBody("ipr", (0, 0, 0), rng=7)
+    body = BareBody(IPR, (0, 0, 0), rng=7)
     for _ in range(200):
         body.follow(0.4, 0.1)
     assert all(count == round(count) for count in body.encoders)
@@ -234,7 +234,7 @@ def test_encoders_count_with_noise_and_odometry_drifts() -> None:
     assert turns.mean() * math.tau * 0.1 == pytest.approx(8.0 - 0.4**2 / 1.04, abs=0.05)
     drift = float(np.hypot(*(body.odometry - body.posture)[:2]))
     assert 0.01 < drift < 1.0
-    exact = BareBody("ipr", (0, 0, 0), reality=IDEAL, rng=7)
+    exact = BareBody(IPR, (0, 0, 0), reality=IDEAL, rng=7)
     exact.drive(0.4, 0.1, 1200)
     assert np.abs(exact.odometry - exact.posture).max() < 1e-9
 
@@ -246,12 +246,10 @@ def test_values_are_checked() -> None:
     }.items():  # fmt: skip
         with pytest.raises(InvalidValueError, match=name):
             MobileReality(**{name: value})  # type: ignore[arg-type]
-    with pytest.raises(InvalidValueError, match="kind"):
-        chassis("mybot")
     with pytest.raises(InvalidValueError, match="posture"):
-        BareBody("ipr", (0, 0))
+        BareBody(IPR, (0, 0))
     with pytest.raises(InvalidValueError, match="period"):
-        BareBody("ipr", period=0.07)
+        BareBody(IPR, period=0.07)
     with pytest.raises(InvalidValueError, match="rays"):
         SonarModel(rays=0)
     drawn = MobileReality.drawn(np.random.default_rng(1))
@@ -260,8 +258,8 @@ def test_values_are_checked() -> None:
 
 def test_a_sonar_tells_nothing_nearer_than_it_can_and_nothing_farther() -> None:
     model = SonarModel(noise=0.0, noise_share=0.0, misses=0.0)
-    ring = SonarRing(chassis("ipr"), model, np.random.default_rng(0))
-    near, far = chassis("ipr").sonar_reach
+    ring = SonarRing(IPR, model, np.random.default_rng(0))
+    near, far = IPR.sonar_reach
     for exact, told in ((0.0, near), (0.5 * near, near), (1.7, 1.7), (1.01 * far, math.inf), (math.inf, math.inf)):
         distances = np.full((16, model.rays), exact)
         assert (ring.scan(distances.ravel(), 1.0).ranges == told).all()

@@ -15,7 +15,7 @@ from robots.bullet.rooms import read_room
 from robots.bullet.serial_arm import Payload
 from robots.bullet.world import LostError, WorldClosedError
 from robots.ipr.body import MobileBody
-from robots.ipr.chassis import CHASSES, IPR, CameraModel, Chassis, MobileReality, Senses, SonarModel, chassis
+from robots.ipr.chassis import IPR, MICRO, CameraModel, Chassis, MobileReality, Senses, SonarModel
 from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -34,11 +34,13 @@ WAYS = {
 }
 
 
-def driven(kind: str, v: float, w: float, seconds: float, reality: MobileReality = IDEAL) -> tuple[Array, Array]:
+def driven(
+    chassis: Chassis, v: float, w: float, seconds: float, reality: MobileReality = IDEAL
+) -> tuple[Array, Array]:
     """Postures of the simulated and of the bare robot after a way and a stop."""
     ends = []
     for make in (MobileBody, BareBody):
-        with make(kind, START, reality=reality, senses=BLIND) as body:
+        with make(chassis, START, reality=reality, senses=BLIND) as body:
             body.drive(v, w, round(seconds / reality.dt))
             body.drive(0.0, 0.0, round(2.0 / reality.dt))
             ends.append(body.posture)
@@ -46,19 +48,19 @@ def driven(kind: str, v: float, w: float, seconds: float, reality: MobileReality
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("kind", sorted(CHASSES))
-def test_with_errors_off_it_goes_the_exact_arcs_and_stops_where_they_end(kind: str, way: str) -> None:
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_with_errors_off_it_goes_the_exact_arcs_and_stops_where_they_end(chassis: Chassis, way: str) -> None:
     # The bare robot's arcs are the virtual one's to 1e-12: tests/robots/ipr/test_bare.py. A step's heading is that
     # of its start, which turns curved ways by half a step's turning: v t ω dt / 2.
     v, w = WAYS[way]
-    body, exact = driven(kind, v, w, 4.0)
+    body, exact = driven(chassis, v, w, 4.0)
     assert np.hypot(*(body - exact)[:2]) <= 1e-3 + 1.5 * abs(v * w) * 4.0 * 0.5 / 240
     assert abs(body[2] - exact[2]) <= 1e-3
 
 
-@pytest.mark.parametrize("kind", sorted(CHASSES))
-def test_it_begins_where_it_is_put_at_rest(kind: str) -> None:
-    with MobileBody(kind, START, reality=MobileReality(encoder_counts=None)) as body:
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_it_begins_where_it_is_put_at_rest(chassis: Chassis) -> None:
+    with MobileBody(chassis, START, reality=MobileReality(encoder_counts=None)) as body:
         assert body.posture == pytest.approx(START, abs=1e-7)
         assert body.time == 0.0
         assert body.encoders == (0.0, 0.0)
@@ -68,11 +70,11 @@ def test_it_begins_where_it_is_put_at_rest(kind: str) -> None:
         assert body.odometry == pytest.approx(START, abs=1e-4)
 
 
-@pytest.mark.parametrize("kind", sorted(CHASSES))
-def test_a_quarter_of_the_step_gives_the_same_way(kind: str) -> None:
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_a_quarter_of_the_step_gives_the_same_way(chassis: Chassis) -> None:
     for v, w in ((0.5, 0.0), (0.4, 0.6)):
-        coarse, _ = driven(kind, v, w, 4.0)
-        fine, exact = driven(kind, v, w, 4.0, replace(IDEAL, dt=1 / 960))
+        coarse, _ = driven(chassis, v, w, 4.0)
+        fine, exact = driven(chassis, v, w, 4.0, replace(IDEAL, dt=1 / 960))
         assert np.hypot(*(coarse - fine)[:2]) < 4e-3
         assert abs(coarse[2] - fine[2]) < 1.5e-3
         assert np.hypot(*(fine - exact)[:2]) < 1e-3
@@ -80,8 +82,8 @@ def test_a_quarter_of_the_step_gives_the_same_way(kind: str) -> None:
 
 def test_what_is_wrong_with_the_wheels_does_what_it_does_to_the_bare_robot() -> None:
     wrong = replace(IDEAL, radius_error=(0.01, -0.01), slip=(0.0, 0.04), base_error=0.03)
-    body, exact = driven("ipr", 0.4, 0.1, 5.0, wrong)
-    ideal, _ = driven("ipr", 0.4, 0.1, 5.0)
+    body, exact = driven(IPR, 0.4, 0.1, 5.0, wrong)
+    ideal, _ = driven(IPR, 0.4, 0.1, 5.0)
     assert np.hypot(*(body - exact)[:2]) < 3e-3
     assert abs(body[2] - exact[2]) < 2e-3
     assert abs(body[2] - ideal[2]) > 0.1
@@ -90,7 +92,7 @@ def test_what_is_wrong_with_the_wheels_does_what_it_does_to_the_bare_robot() -> 
 def test_shafts_turn_as_told_whatever_the_casters_take() -> None:
     ends = []
     for make in (MobileBody, BareBody):
-        with make("ipr", START, reality=replace(IDEAL, rolling=20.0), senses=BLIND) as body:
+        with make(IPR, START, reality=replace(IDEAL, rolling=20.0), senses=BLIND) as body:
             body.drive(0.3, 0.5, 720)
             ends.append(body.odometry)
     assert np.abs(ends[0] - ends[1]).max() < 1e-4
@@ -114,16 +116,16 @@ def measured_mass(part: Chassis) -> tuple[float, Array, Array]:
     return mass, centre, inertia
 
 
-@pytest.mark.parametrize(("kind", "total"), [("ipr", 75.0), ("micro", 0.430)])
-def test_masses_and_inertias(kind: str, total: float) -> None:
-    part = chassis(kind)
+@pytest.mark.parametrize(("chassis", "total"), [(IPR, 75.0), (MICRO, 0.430)])
+def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
+    part = chassis
     assert part.mass == pytest.approx(total, abs=1e-9)
     mass, centre, inertia = part.rigid()
     expected_mass, expected_centre, expected = measured_mass(part)
     assert mass == pytest.approx(expected_mass, rel=1e-9)
     assert centre == pytest.approx(expected_centre, abs=1e-9)
     assert inertia == pytest.approx(expected, abs=1e-9 * expected.max())
-    model = ipr.model(kind)
+    model = ipr.model(chassis.kind)
     body, wheels = model.body, model.wheels
     assert (part.length, part.width, part.height, part.centre_x) == (
         body.length, body.width, body.height, -body.axle_offset,
@@ -131,7 +133,7 @@ def test_masses_and_inertias(kind: str, total: float) -> None:
     assert (part.mass, part.wheel_base, part.wheel_radius) == (body.mass, wheels.base, wheels.radius)
     assert part.limits == model.limits
     # PyBullet has what it was given: it drops inertias silently when a call names damping, too.
-    with MobileBody(kind, START, senses=BLIND) as robot:
+    with MobileBody(chassis, START, senses=BLIND) as robot:
         bullet, client = robot.world.bullet, robot.world.client
         told = [
             bullet.getDynamicsInfo(robot.body_id, j, physicsClientId=client)
@@ -145,9 +147,9 @@ def test_masses_and_inertias(kind: str, total: float) -> None:
         assert row[2][1] == pytest.approx(spin, rel=0.01)
 
 
-@pytest.mark.parametrize("kind", sorted(CHASSES))
-def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(kind: str) -> None:
-    with MobileBody(kind, START, reality=IDEAL, senses=BLIND) as body:
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(chassis: Chassis) -> None:
+    with MobileBody(chassis, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.3, 0.0, 480)
         bullet, client = body.world.bullet, body.world.client
         points = bullet.getContactPoints(bodyA=body.body_id, physicsClientId=client)
@@ -158,7 +160,7 @@ def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(kind: str) 
 
 def start(v: float, w: float, reality: MobileReality = IDEAL) -> tuple[Any, Any]:
     """Wheels of the IPR while it speeds up, averaged over half a second, and long after."""
-    with MobileBody("ipr", START, reality=reality, senses=BLIND) as body:
+    with MobileBody(IPR, START, reality=reality, senses=BLIND) as body:
         body.drive(v, w, 60)
         early = []
         for _ in range(120):
@@ -196,7 +198,7 @@ def test_torques_are_newtons() -> None:
 
 
 def test_work_becomes_energy_of_motion() -> None:
-    with MobileBody("ipr", START, reality=IDEAL, senses=BLIND) as body:
+    with MobileBody(IPR, START, reality=IDEAL, senses=BLIND) as body:
         work = 0.0
         for _ in range(300):
             body.drive(0.5, 0.0)
@@ -208,8 +210,8 @@ def test_work_becomes_energy_of_motion() -> None:
 
 
 def test_it_never_tips_nor_slides_within_the_limits() -> None:
-    for kind, most in (("ipr", 0.004), ("micro", 0.025)):
-        with MobileBody(kind, START, senses=BLIND, rng=1) as body:
+    for chassis, most in ((IPR, 0.004), (MICRO, 0.025)):
+        with MobileBody(chassis, START, senses=BLIND, rng=1) as body:
             rng = np.random.default_rng(2)
             tilt, before = 0.0, body.motion
             for k in range(60):
@@ -231,7 +233,7 @@ def test_weak_drives_and_a_slippery_floor_fall_behind_and_say_nothing_wrong() ->
         assert max(abs(wheel.torque) for wheel in body.wheels) <= 1.0 + 1e-9
         assert body.motion[0] < 0.16
     icy = replace(IDEAL, friction=0.02)
-    with MobileBody("ipr", (0, 0, 0), reality=icy, senses=BLIND) as body:
+    with MobileBody(IPR, (0, 0, 0), reality=icy, senses=BLIND) as body:
         body.drive(0.5, 0.0, 240)
         # Less than μ g on three quarters of the weight is left of 0.52 m/s²; the wheels turn on.
         assert body.posture[0] < 0.12
@@ -242,7 +244,7 @@ def test_a_payload_moves_the_centre_of_mass() -> None:
     behind, before = (Payload(20.0, (x, 0.0, 0.5)) for x in (-0.2, -0.02))
     loads = []
     for payload in (None, behind, before):
-        with MobileBody("ipr", START, reality=replace(IDEAL, payload=payload), senses=BLIND) as body:
+        with MobileBody(IPR, START, reality=replace(IDEAL, payload=payload), senses=BLIND) as body:
             body.drive(0.2, 0.0, 240)
             loads.append(sum(wheel.load for wheel in body.wheels))
             assert body.posture[1] == pytest.approx(START[1] + (body.posture[0] - 1) * math.tan(0.3), abs=2e-3)
@@ -251,13 +253,13 @@ def test_a_payload_moves_the_centre_of_mass() -> None:
 
 def test_one_that_falls_over_is_lost() -> None:
     heavy = replace(IDEAL, payload=Payload(50.0, (0.5, 0.0, 0.8)))
-    with pytest.raises(LostError, match="fell over at"), MobileBody("ipr", START, reality=heavy) as body:
+    with pytest.raises(LostError, match="fell over at"), MobileBody(IPR, START, reality=heavy) as body:
         body.drive(0.0, 0.0, 480)
 
 
 def test_it_runs_into_a_wall_and_says_so() -> None:
     room = read_room("room 1\nsize 4 4\nwall 3 0 3 4\nperson 0.25 0,1,3.5 3,1,3.5 5,1,2\n")
-    with MobileBody("ipr", (2.0, 2.0, 0.0), room=room, rng=1) as body:
+    with MobileBody(IPR, (2.0, 2.0, 0.0), room=room, rng=1) as body:
         body.drive(0.5, 0.0, 240 * 3)
         assert [c.thing for c in body.collisions] == ["wall in line 3"]
         assert body.touching == "wall in line 3"
@@ -269,7 +271,7 @@ def test_it_runs_into_a_wall_and_says_so() -> None:
         assert body.posture[0] < 2.5
         with pytest.raises(InvalidValueError):
             body.drive(0.6, 0.0)
-    with MobileBody("ipr", (1.0, 2.0, 0.0), room=room, rng=1) as body:
+    with MobileBody(IPR, (1.0, 2.0, 0.0), room=room, rng=1) as body:
         body.drive(0.0, 0.0, 240 * 5)
         assert [c.thing for c in body.collisions] == ["person in line 4"]
 
@@ -278,7 +280,7 @@ def test_what_comes_and_goes_is_met_only_while_it_stands() -> None:
     room = read_room("room 1\nsize 4 4\nbox 3 2 0.2 2 from=2 until=4\n")
     quiet = Senses(SonarModel(noise=0.0, noise_share=0.0, misses=0.0))
     seen = []
-    with MobileBody("ipr", (1.0, 2.0, 0.0), room=room, senses=quiet) as body:
+    with MobileBody(IPR, (1.0, 2.0, 0.0), room=room, senses=quiet) as body:
         for _ in range(50):
             body.follow(0.0, 0.0)
             assert body.sonar is not None
@@ -292,7 +294,7 @@ def test_its_sonars_tell_what_the_bare_robots_tell() -> None:
     for posture in postures:
         scans = []
         for make in (MobileBody, BareBody):
-            with make("ipr", posture, room="furnished", senses=quiet) as body:
+            with make(IPR, posture, room="furnished", senses=quiet) as body:
                 body.drive(0.0, 0.0, 1)
                 assert body.sonar is not None
                 scans.append(body.sonar.ranges)
@@ -305,7 +307,7 @@ def test_its_sonars_tell_what_the_bare_robots_tell() -> None:
 def trace(parts: list[int], seed: int) -> bytes:
     found = []
     exact = MobileReality(encoder_counts=None)
-    with MobileBody("ipr", room="furnished", rng=seed, reality=exact) as body:
+    with MobileBody(IPR, room="furnished", rng=seed, reality=exact) as body:
         for k in range(15):
             for steps in parts:
                 body.drive(0.3, 0.7 * math.sin(k), steps)
@@ -323,7 +325,7 @@ def test_the_same_seed_gives_the_same_to_the_last_bit() -> None:
 
 
 def test_a_closed_robot_is_of_no_use() -> None:
-    body = MobileBody("micro", START)
+    body = MobileBody(MICRO, START)
     body.close()
     body.close()
     assert body.closed
@@ -333,7 +335,7 @@ def test_a_closed_robot_is_of_no_use() -> None:
 
 @pytest.mark.parametrize("make", [MobileBody, BareBody])
 def test_who_is_lifted_in_motion_stands_where_he_is_put(make: type[MobileBody] | type[BareBody]) -> None:
-    with make("ipr", START, reality=IDEAL, senses=BLIND) as body:
+    with make(IPR, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.5, 0.3, 480)
         there = (4.0, -1.0, 2.0)
         body.carry(there)
@@ -342,7 +344,7 @@ def test_who_is_lifted_in_motion_stands_where_he_is_put(make: type[MobileBody] |
         # Its wheels still turn, as nobody told them.
         body.drive(0.0, 0.0, 480)
         assert np.hypot(*(body.posture - there)[:2]) < 0.5
-    with make("ipr", room="furnished", senses=BLIND) as body:
+    with make(IPR, room="furnished", senses=BLIND) as body:
         before = body.posture
         with pytest.raises(InvalidValueError, match="stands free"):
             body.carry((0.0, 0.0, 0.0))

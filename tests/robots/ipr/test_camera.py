@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robots.ipr.camera import NECK, REACH, Lens, Look, PanTilt, PanTiltConfig, lens_pose
 from robots.ipr.chassis import IPR
-from robots.ipr.shapes import SCREEN_SIZE, headless, screen_pose, shapes
+from robots.ipr.shapes import SCREEN_SIZE, headless, ipr_shapes, screen_pose
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -115,7 +115,7 @@ def test_the_lens_looks_where_the_angles_say(pan: float, tilt: float) -> None:
 
 
 def test_the_lens_is_at_the_front_of_the_head_and_the_head_is_not_in_its_way() -> None:
-    body, (whole, *_) = headless(), shapes("ipr")
+    body, (whole, *_) = headless(), ipr_shapes()
     ahead = lens_pose(Look(0.0, 0.0))[:3, 3]
     head = whole.vertices[whole.vertices[:, 2] > 0.68]
     assert ahead[0] == pytest.approx(head[:, 0].max(), abs=1e-3)
@@ -125,7 +125,7 @@ def test_the_lens_is_at_the_front_of_the_head_and_the_head_is_not_in_its_way() -
 
 def test_the_screen_is_on_the_glass() -> None:
     X = screen_pose()
-    whole = shapes("ipr")[0]
+    whole = ipr_shapes()[0]
     inside = (whole.vertices - X[:3, 3]) @ X[:3, :3]
     glass = inside[np.abs(inside[:, 0] - 0.009) < 1e-9]
     assert glass[:, 1].max() - glass[:, 1].min() == pytest.approx(SCREEN_SIZE[0])

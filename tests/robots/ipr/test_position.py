@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from robots.ipr.chassis import CameraModel, MobileReality, Senses
+from robots.ipr.chassis import IPR, CameraModel, MobileReality, Senses
 from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
 from robots.ipr.robot import BareBody
 from vrs.errors import InvalidValueError
@@ -20,7 +20,7 @@ CURVE = (0.4, 0.5)
 
 def test_late_pictures_of_an_exact_robot_change_nothing() -> None:
     """They're compared with where it was when they were taken: else it would fall behind."""
-    body = BareBody("ipr", (1.0, 2.0, 0.5), reality=IDEAL, senses=EXACT)
+    body = BareBody(IPR, (1.0, 2.0, 0.5), reality=IDEAL, senses=EXACT)
     fused = FusedPosition(body)
     for _ in range(60):
         body.follow(*CURVE)
@@ -29,7 +29,7 @@ def test_late_pictures_of_an_exact_robot_change_nothing() -> None:
 
 @pytest.mark.parametrize(("share", "turn_share"), [(0.1, 0.05), (0.5, 0.0), (0.0, 0.3)])
 def test_each_picture_takes_away_its_share_of_the_difference(share: float, turn_share: float) -> None:
-    body = BareBody("ipr", (1.0, 2.0, 0.5), reality=IDEAL, senses=EXACT)
+    body = BareBody(IPR, (1.0, 2.0, 0.5), reality=IDEAL, senses=EXACT)
     fused = FusedPosition(body, share=share, turn_share=turn_share)
     fused.posture()
     # Somebody lifts it: its odometry doesn't know.
@@ -50,7 +50,7 @@ def test_each_picture_takes_away_its_share_of_the_difference(share: float, turn_
 
 
 def test_the_others_are_what_they_say() -> None:
-    body = BareBody("ipr", (1.0, 2.0, 0.5), rng=3)
+    body = BareBody(IPR, (1.0, 2.0, 0.5), rng=3)
     for _ in range(50):
         body.follow(*CURVE)
     assert TruePosition(body).posture() == body.truth

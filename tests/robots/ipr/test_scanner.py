@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robots.ipr.body import MobileBody
-from robots.ipr.chassis import MobileReality, Senses
+from robots.ipr.chassis import IPR, MobileReality, Senses
 from robots.ipr.floor_plan import FloorPlan
 from robots.ipr.robot import BareBody, MobileRobot, place
 from robots.onboard.laser import LaserModel
@@ -21,7 +21,7 @@ START = (1.2, 1.3, 0.4)
 
 def robot(laser: LaserModel, *, seed: int = 0, kind: type[MobileRobot] = BareBody, **more: object) -> MobileRobot:
     senses = Senses(sonar=None, camera=None, laser=laser)
-    return kind("ipr", START, room="furnished", senses=senses, rng=seed, **more)
+    return kind(IPR, START, room="furnished", senses=senses, rng=seed, **more)
 
 
 def exact(posture: tuple[float, float, float], laser: LaserModel, beam: int) -> float:
@@ -77,7 +77,7 @@ def test_calls_split_in_any_way_give_the_same_scans() -> None:
 
 
 def test_a_laser_changes_nothing_else() -> None:
-    with_laser, without = robot(LaserModel(), seed=5), BareBody("ipr", START, room="furnished", rng=5)
+    with_laser, without = robot(LaserModel(), seed=5), BareBody(IPR, START, room="furnished", rng=5)
     for body in (with_laser, without):
         body.drive(0.3, 0.2, 100)
     assert with_laser.truth == without.truth

@@ -32,7 +32,7 @@ def watched(
     """What a robot that turns on the spot has seen, and who moved in each scan."""
     roads = route_map(room, IPR.footprint)
     found = ObstacleMap(Grid((120, 80), 0.05), lambda places: roads.knows(places, 0.07), config)
-    body = BareBody("ipr", room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
+    body = BareBody(IPR, room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
     track, movers, seen = OdometryTrack(), [], -1.0
     while body.time < seconds:
         track.add(body.time, body.reckoned)

@@ -238,7 +238,7 @@ def test_nobody_who_walks_through_is_run_into(seed: int) -> None:
 
 def test_on_a_drive_echoes_are_as_old_as_the_drive_says() -> None:
     """The body's own time is another one: it may have stood there for long."""
-    with BareBody("ipr", room=place("furnished"), rng=0) as body:
+    with BareBody(IPR, room=place("furnished"), rng=0) as body:
         while body.time < 5.0:
             body.drive(0.0, 0.0, 30)
         scan, own = echoes_of(body, 4.0), body.sonar

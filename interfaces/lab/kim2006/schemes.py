@@ -6,7 +6,7 @@ import struct
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 from typing_extensions import override
 
@@ -17,28 +17,18 @@ from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig
 from interfaces.rsp.outputs import Commanded, Told
 from interfaces.rsp.robot import RobotConfig, RobotCore
 from interfaces.rsp.session import SLACK
-from vrs.checks import one_of, validated, within
+from robots.onboard.driving import Posture
+from vrs.checks import one_of
 
 Rims = tuple[int, int]
 """Speeds of the left and the right wheel at the rim [mm/s]."""
 
 
-class ReportedPosition(NamedTuple):
-    """The newest position that the local system has."""
-
-    x: float
-    """[m]."""
-    y: float
-    """[m]."""
-    theta: float
-    """[rad]."""
-
-
 class LocalEnd(Protocol):
     """The local system's end."""
 
-    seen: ReportedPosition | None
-    """Newest position that came."""
+    seen: Posture | None
+    """Newest posture that came."""
 
     def write(self, rims: Rims, *, now: float) -> None:
         """Set what the wheels are to do."""
@@ -65,7 +55,7 @@ class RobotEnd(Protocol):
     def fired(self) -> list[int]:
         """Numbers of the commands that came since the last call, from 0."""
 
-    def measure(self, position: ReportedPosition) -> None:
+    def measure(self, posture: Posture) -> None:
         """Set where the robot is."""
 
     def to_send(self, *, now: float) -> list[bytes]:
@@ -76,6 +66,12 @@ class RobotEnd(Protocol):
         """When what the wheels do was given, on the local system's clock [s]; None before anything came."""
 
 
+PERIOD: Final = 0.02
+"""T of all schemes [s], the paper's."""
+LOSS: Final = 0.5
+"""T_loss [s]: after so long without a packet the wheels stop."""
+REPEATS: Final = 8
+"""How often inputs are sent where they're repeated."""
 _HEAD: Final = struct.Struct("!IIB")
 """Number of the newest input, its stamp [ms], how many inputs follow."""
 _INPUT: Final = struct.Struct("!hhi")
@@ -95,17 +91,16 @@ class PlainLocal(LocalEnd):
     small as they can be.
     """
 
-    def __init__(self, period: float, repeat: int, size: int) -> None:
+    def __init__(self, repeats: int, size: int) -> None:
         """Begin at time 0.
 
         Args:
-            period: T [s].
-            repeat: Inputs in a packet, 1 to 255: each is sent as often.
+            repeats: Inputs in a packet, 1 to 255: each is sent as often.
             size: Of every packet [byte]; 0 for as small as it can be.
         """
-        self.seen: ReportedPosition | None = None
-        self._T, self._size = period, size
-        self._recent: deque[bytes] = deque(maxlen=repeat)
+        self.seen: Posture | None = None
+        self._size = size
+        self._recent: deque[bytes] = deque(maxlen=repeats)
         self._rims: Rims = (0, 0)
         self._fires: deque[int] = deque()
         self._number = self._count = 0
@@ -126,13 +121,13 @@ class PlainLocal(LocalEnd):
         """See `LocalEnd`; what is older than the newest is of no use."""
         number, x, y, theta = _UP.unpack_from(data)
         if number > self._newest:
-            self._newest, self.seen = number, ReportedPosition(x, y, theta)
+            self._newest, self.seen = number, Posture(x, y, theta)
 
     @override
     def to_send(self, *, now: float) -> list[bytes]:
         if now < self._next - SLACK:
             return []
-        self._next = max(self._next + self._T, now + 0.5 * self._T)
+        self._next = max(self._next + PERIOD, now + 0.5 * PERIOD)
         self._recent.append(_INPUT.pack(*self._rims, self._fires.popleft() if self._fires else -1))
         self._number += 1
         head = _HEAD.pack(self._number, round(1000 * now), len(self._recent))
@@ -142,26 +137,21 @@ class PlainLocal(LocalEnd):
 class PlainRobot(RobotEnd):
     """The robot's end."""
 
-    def __init__(
-        self, model: RobotModel, period: float, size: int, loss: float, config: MotionFilterConfig
-    ) -> None:
+    def __init__(self, model: RobotModel, size: int) -> None:
         """Begin at time 0.
 
         Args:
             model: Of the robot, for its filter.
-            period: T [s].
             size: Of every packet [byte]; 0 for as small as it can be.
-            loss: T_loss [s]: after so long without a packet the wheels stop.
-            config: Of the filter.
         """
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
         assert isinstance(model.elements[self._left], Effector)
-        self._filter = MotionFilter(model, config)
-        self._T, self._size, self._loss = period, size, loss
+        self._filter = MotionFilter(model, MotionFilterConfig())
+        self._size = size
         self._heard: float | None = None
         self._newest = self._told = 0
         self._commands: list[int] = []
-        self._position = ReportedPosition(0.0, 0.0, 0.0)
+        self._posture = Posture(0.0, 0.0, 0.0)
         self._number = 0
         self._next = 0.0
 
@@ -176,13 +166,13 @@ class PlainRobot(RobotEnd):
             if command >= 0:
                 self._commands.append(command)
             told = {self._left: (float(left),), self._right: (float(right),)}
-            self._filter.receive(1e-3 * stamp - (number - k) * self._T, told, now=now, fresh=k == number)
+            self._filter.receive(1e-3 * stamp - (number - k) * PERIOD, told, now=now, fresh=k == number)
         self._newest, self._heard = number, now
 
     @override
     def drive(self, *, now: float) -> Rims:
         self._filter.play(now)
-        if self._heard is None or now - self._heard >= self._loss:
+        if self._heard is None or now - self._heard >= LOSS:
             return 0, 0
         left, right = (self._filter.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
@@ -193,16 +183,16 @@ class PlainRobot(RobotEnd):
         return found
 
     @override
-    def measure(self, position: ReportedPosition) -> None:
-        self._position = position
+    def measure(self, posture: Posture) -> None:
+        self._posture = posture
 
     @override
     def to_send(self, *, now: float) -> list[bytes]:
         if self._heard is None or now < self._next - SLACK:
             return []
-        self._next = max(self._next + self._T, now + 0.5 * self._T)
+        self._next = max(self._next + PERIOD, now + 0.5 * PERIOD)
         self._number += 1
-        return [_UP.pack(self._number, *self._position).ljust(self._size, b"\0")]
+        return [_UP.pack(self._number, *self._posture).ljust(self._size, b"\0")]
 
     @property
     @override
@@ -220,7 +210,7 @@ class RspLocal(LocalEnd):
         """Open a session at time 0, and ask for the position."""
         self.core = LocalCore(model, random_bytes, config)
         self.core.open(now=0.0)
-        self.seen: ReportedPosition | None = None
+        self.seen: Posture | None = None
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
         self._fire, self._position = model.index("ir_fire"), model.index("position")
         self.core.request(self._position, True)
@@ -248,7 +238,7 @@ class RspLocal(LocalEnd):
             if isinstance(output, Told) and output.index == self._position:
                 scale = self._sensor.scale
                 x, y, theta = self._sensor.format.unpack(output.payload)
-                self.seen = ReportedPosition(scale * x, scale * y, scale * theta)
+                self.seen = Posture(scale * x, scale * y, scale * theta)
 
     @override
     def to_send(self, *, now: float) -> list[bytes]:
@@ -289,8 +279,8 @@ class RspRobot(RobotEnd):
         return found
 
     @override
-    def measure(self, position: ReportedPosition) -> None:
-        raw = (round(value / self._sensor.scale) for value in position)
+    def measure(self, posture: Posture) -> None:
+        raw = (round(value / self._sensor.scale) for value in posture)
         self.core.measure(self._position, self._sensor.format.pack(*raw))
 
     @override
@@ -309,19 +299,7 @@ TCP_HEADER: Final = 40
 """IPv4 and TCP without options [byte]."""
 
 
-@dataclass(frozen=True, slots=True)
-@validated
-class SchemeConfig:
-    """What all schemes share."""
-
-    period: Annotated[float, within(1e-3, 1.0, "s")] = 0.02
-    """T [s], in [0.001, 1]; the paper's 20 ms."""
-    loss: Annotated[float, within(0.1, 2.0, "s")] = 0.5
-    """T_loss [s], in [0.1, 2]."""
-    repeat: Annotated[int, within(1, 255)] = 8
-    """How often inputs are sent where they're repeated, 1 to 255."""
-    adaptive: bool = False
-    """Whether RSP fits T to the link."""
+Ends = tuple[LocalEnd, RobotEnd]
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,16 +310,14 @@ class Scheme:
     service: Service
     header: int
     """What the network adds to a packet [byte]."""
-    ends: Callable[[RobotModel, SchemeConfig, Callable[[int], bytes]], tuple[LocalEnd, RobotEnd]]
-    """Makes both ends; the last argument gives random bytes."""
+    ends: Callable[[RobotModel, Callable[[int], bytes], bool], Ends]
+    """Makes both ends, of what gives random bytes, and whether RSP fits T to the link."""
 
 
-def _rsp(
-    model: RobotModel, config: SchemeConfig, random_bytes: Callable[[int], bytes]
-) -> tuple[LocalEnd, RobotEnd]:
-    period = PeriodConfig(least=config.period, adaptive=config.adaptive)
+def _rsp(model: RobotModel, random_bytes: Callable[[int], bytes], adaptive: bool) -> Ends:
+    period = PeriodConfig(least=PERIOD, adaptive=adaptive)
     local = RspLocal(model, random_bytes, LocalConfig(period=period, lifetime=120.0))
-    robot = RspRobot(model, random_bytes, RobotConfig(loss=config.loss, period=config.period, lifetime=120.0))
+    robot = RspRobot(model, random_bytes, RobotConfig(loss=LOSS, period=PERIOD, lifetime=120.0))
     # The session is opened beforehand, as a TCP connection is: the comparison begins after that.
     for _ in range(2):
         for data in local.to_send(now=0.0):
@@ -351,23 +327,17 @@ def _rsp(
     return local, robot
 
 
-def _plain(
-    repeat: bool, down: int, up: int
-) -> Callable[[RobotModel, SchemeConfig, Callable[[int], bytes]], tuple[LocalEnd, RobotEnd]]:
-    def made(model: RobotModel, config: SchemeConfig, _: object) -> tuple[LocalEnd, RobotEnd]:
-        local = PlainLocal(config.period, config.repeat if repeat else 1, down)
-        return local, PlainRobot(model, config.period, up, config.loss, MotionFilterConfig())
-
-    return made
+def _plain(repeats: int, down: int, up: int) -> Callable[[RobotModel, Callable[[int], bytes], bool], Ends]:
+    return lambda model, _, __: (PlainLocal(repeats, down), PlainRobot(model, up))
 
 
 SCHEMES: Final[dict[str, Scheme]] = {
     each.name: each
     for each in (
         Scheme("rsp", Service.DATAGRAM, UDP_HEADER, _rsp),
-        Scheme("fixed", Service.DATAGRAM, UDP_HEADER, _plain(False, FIXED_DOWN, FIXED_UP)),
-        Scheme("tcp", Service.IN_ORDER, TCP_HEADER, _plain(False, FIXED_DOWN, FIXED_UP)),
-        Scheme("repeated", Service.DATAGRAM, UDP_HEADER, _plain(True, 0, 0)),
+        Scheme("fixed", Service.DATAGRAM, UDP_HEADER, _plain(1, FIXED_DOWN, FIXED_UP)),
+        Scheme("tcp", Service.IN_ORDER, TCP_HEADER, _plain(1, FIXED_DOWN, FIXED_UP)),
+        Scheme("repeated", Service.DATAGRAM, UDP_HEADER, _plain(REPEATS, 0, 0)),
     )
 }
 """RSP; packets of one size on UDP, on TCP; inputs repeated without acknowledgement."""
