@@ -20,7 +20,7 @@ from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
 from interfaces.val2.rows import Kind, nearest
 from interfaces.val2.signals import legal, settable
-from interfaces.val2.source import SourceFile, read_all, words_of
+from interfaces.val2.source import SourceFile, read_all
 from interfaces.val2.structure import survey
 from interfaces.val2.syntax import (
     Apply,
@@ -60,11 +60,11 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFindi
     Returns:
         What it holds, None if not every line could be read; and what was found, in the order of its lines.
     """
-    source, unreadable = read_all(text, name)
+    source, unreadable, words = read_all(text, name)
     found = [_error(error) for error in unreadable.values()]
     if not source.programs and not unreadable:
         found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
-    checker = _Checker(source, unreadable.keys(), words_of(text, unreadable))
+    checker = _Checker(source, unreadable.keys(), words)
     for program in source.programs:
         found += checker.program(program)
     found += _alike_names(text)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from interfaces.val2.context import Code, Context, StepFunction, Warned
 from interfaces.val2.errors import ValError
 from interfaces.val2.forms import UNAVAILABLE
+from interfaces.val2.grammar import undefined
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
 from interfaces.val2.syntax import Instruction, Program, Step
@@ -54,6 +55,8 @@ def _whatever(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
 
 def _step(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
     i = step.statement
+    if (error := undefined(i)) is not None:
+        raise error
     act = STATEMENTS[i.keyword].act if i.passed is None else _passed_over
     assert act is not None
     made: StepFunction = act(x, i, n)
