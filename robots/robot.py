@@ -159,7 +159,14 @@ class Display:
 
 @dataclass(frozen=True, slots=True)
 class HeadCamera:
-    """A camera that pictures are made with."""
+    """A camera that pans and tilts, and that pictures are made with."""
+
+    neck: tuple[float, float, float]
+    """Where both axes cross, in the robot's frame [m]."""
+    reach: float
+    """How far the lens is before that [m]."""
+    body: Callable[[], LinkShape]
+    """What it may see of the robot, in the robot's frame."""
 
 
 @dataclass(frozen=True, slots=True)

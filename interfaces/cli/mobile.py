@@ -180,8 +180,8 @@ async def serve_mobile(serving: MobileServing, access: Access) -> None:
         config = LiveMobileOperatorConfig(
             serving.robot, room, "", serving.conditions, serving.robot_token, serving.seed, software(),
             None if serving.jobs is None else JobFile(serving.jobs),
-            camera=CameraConfig(serving.camera) if seeing else None, link_loss=serving.link_loss,
-            arm=lasts,
+            camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if seeing else None,
+            link_loss=serving.link_loss, arm=lasts,
         )  # fmt: skip
         operator = LiveMobileOperator(config, access)
         lost.add_done_callback(partial(say_lost, operator.lose))

@@ -19,6 +19,8 @@ HEAD: Final = 4
 class Setup(msgspec.Struct, frozen=True, tag=True):
     """Site: what is to be seen, and how; the first message."""
 
+    robot: str
+    """What `robots.load` finds the robot by that has the camera."""
     room: Room
     lens: Lens
     rate: float

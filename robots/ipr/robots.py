@@ -10,7 +10,7 @@ from robots.ipr import chassis
 from robots.ipr.body import MobileBody
 from robots.ipr.model import Kind, model
 from robots.ipr.robot import BareBody
-from robots.ipr.shapes import SCREEN_SIZE, ipr_shapes, links, micro_shapes, screen_pose
+from robots.ipr.shapes import NECK, REACH, SCREEN_SIZE, headless, ipr_shapes, links, micro_shapes, screen_pose
 from robots.onboard.laser import LaserModel
 from robots.robot import Appearance, Display, HeadCamera, Robot
 from robots.solids import LinkShape
@@ -25,7 +25,12 @@ def _robot(kind: Kind, body: chassis.Chassis, shapes: Callable[[], Sequence[Link
 
 
 ROBOT: Final = _robot(
-    Kind.IPR, chassis.IPR, ipr_shapes, Display(SCREEN_SIZE, screen_pose), HeadCamera(), LaserModel()
+    Kind.IPR,
+    chassis.IPR,
+    ipr_shapes,
+    Display(SCREEN_SIZE, screen_pose),
+    HeadCamera(NECK, REACH, headless),
+    LaserModel(),
 )
 """The 75 kg robot of section 2.1, with a display and a camera in its head."""
 MICRO: Final = _robot(Kind.MICRO, chassis.MICRO, micro_shapes, LaserModel(forward=0.0, height=0.06))

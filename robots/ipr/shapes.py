@@ -18,6 +18,7 @@ from robots.base import upright
 from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.ipr.chassis import IPR, MICRO, Chassis
 from robots.ipr.drive_train import as_posture
+from robots.ipr.model import IPR_AXLE_OFFSET
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
 from vrs.checks import finite_array
 from vrs.model import Array, frozen_array
@@ -41,6 +42,10 @@ NEW: Final = (0.80, 0.42, 0.20)
 CLOTH: Final = (0.30, 0.36, 0.52)
 SKIN: Final = (0.86, 0.68, 0.56)
 
+NECK: Final = (-IPR_AXLE_OFFSET - 0.03, 0.0, 0.712)
+"""Where the axes of the IPR's head cross, in the robot's frame [m]: the head's middle."""
+REACH: Final = 0.066
+"""How far its camera's lens is before that [m]: as far as the head's glass."""
 SCREEN_SIZE: Final = (0.224, 0.134)
 """Width and height of the IPR's display [m]; less than the paper's 12.1 inches, so that it fits the front."""
 
