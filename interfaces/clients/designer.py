@@ -17,7 +17,7 @@ from interfaces.messages import Order, Outcome, RefusalCode, Reply
 from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
-from vrs.ledger import Receipt
+from vrs.ledger import Receipt, Status
 
 REMEMBERED = 4096
 """Commands whose fate is kept; the oldest is forgotten first."""
@@ -51,6 +51,13 @@ class Issued:
     def is_pending(self) -> bool:
         """Whether nothing was heard of it yet."""
         return self.answered_at is None
+
+    @property
+    def reason(self) -> str:
+        """Why nothing came of it; empty where something did, or may yet."""
+        if self.receipt is not None and self.receipt.status is Status.REJECTED:
+            return self.receipt.reason
+        return self.refusal
 
     @property
     def late(self) -> float:

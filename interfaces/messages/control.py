@@ -181,6 +181,11 @@ def may_send(role: Role, sender: Party) -> bool:
     return sender in _PARTIES[role]
 
 
+def covers(role: Role, other: Role) -> bool:
+    """Whether a client of a role may send all that one of another may."""
+    return _PARTIES[role] >= _PARTIES[other]
+
+
 class ProblemCode(enum.StrEnum):
     """Why a message wasn't taken, or a connection ends."""
 

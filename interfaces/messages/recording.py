@@ -71,8 +71,8 @@ class GridFacts(Record, frozen=True, omit_defaults=True, gc=False):
 class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """How a mobile robot's run was set up."""
 
-    body: Literal["ipr", "micro", "bare"]
-    """Which robot of its family."""
+    body: Word
+    """Which robot, by its name; `bare`: the usual one with its bare body."""
     architecture: Word
     """By its name, as `vrs lab --architecture` takes it."""
     transport: Literal["stream", "datagrams"]

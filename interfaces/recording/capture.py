@@ -20,26 +20,27 @@ from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.messages.recording import (
     Anchor,
-    ChangeEntry,
     CommandRecord,
     Direction,
+    EditEntry,
     GivenEntry,
     HistoryEntry,
     Late,
     LinkEntry,
     ReceiptEntry,
     Site,
-    VirtualSample,
 )
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
 from interfaces.recording.history import edit_entries, whole_entries
+from interfaces.recording.kinds import ARM, MOBILE
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import Correction, OperatorSite
+from interfaces.teleop import Correction
 from interfaces.teleop.operator import SiteObserver
 from vrs.commands import Profile
+from vrs.engine import Engine, MobileEngine
 from vrs.ledger import Receipt, Standing, Status
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 from vrs.timeline import Timeline
 
 MOST_AT_ONCE = 1200
@@ -69,7 +70,7 @@ class _Happened(NamedTuple):
     after: Timeline
 
 
-class Capture(SiteObserver):
+class Capture(SiteObserver[Report, Timeline]):
     """Writes down an operator's site: it listens, and writes what is due when it's told the time.
 
     While it listens it only takes notes: commands don't wait for it.
@@ -77,8 +78,7 @@ class Capture(SiteObserver):
 
     def __init__(
         self,
-        operator: OperatorSite,
-        model: RobotModel,
+        engine: Engine,
         *,
         now: float,
         step: float,
@@ -86,21 +86,22 @@ class Capture(SiteObserver):
         most_before: int = MOST_BEFORE,
         apart: bool = False,
     ) -> None:
-        """Begin with a site, at its start or in the middle.
+        """Begin with a site, at its start or in the middle; who makes this lets it listen to the site.
 
         Args:
-            operator: The site; this becomes its listener.
-            model: The robot.
+            engine: The site's.
             now: By the operator's clock [s].
             step: Between two samples of the virtual robot [s].
             every: Whether receipts name every command that they shifted or superseded, however many.
             most_before: See `MOST_BEFORE`.
             apart: Whether somebody else writes what `first` gives, before anything else.
         """
-        self.operator, self.model, self.step, self._every = operator, model, step, every
+        self.engine, self.model, self.step, self._every = engine, engine.model, step, every
+        self.kind = MOBILE if isinstance(engine, MobileEngine) else ARM
+        """Of the robot."""
         self.put: Put | None = None
         """Takes what is written; None at first, and when nothing can be written any more."""
-        self._timeline = timeline = operator.engine.timeline
+        self._timeline = timeline = engine.timeline
         self._cut = max(min(timeline.index_at(now) - 2, len(timeline) - most_before), 0)
         self._happened: deque[_Happened] = deque()
         self._due: list[tuple[float, Message]] = []
@@ -111,11 +112,10 @@ class Capture(SiteObserver):
         self._pose = Paced(POSE_RATE)
         self.links = Paced(LINK_RATE)
         """When links of the virtual robot are shown."""
-        fresh = not operator.engine.newest and not len(timeline) and timeline.start == now
-        self.late = None if fresh else operator.engine.standing()
+        fresh = not engine.newest and not len(timeline) and timeline.start == now
+        self.late = None if fresh else engine.standing()
         """How the engine stood; None where nothing had happened yet."""
         self._began = timeline, now
-        operator.listener = self
         for message in () if apart else self.first():
             self.add(now, message)
 
@@ -150,37 +150,38 @@ class Capture(SiteObserver):
         raise error
 
     def _note(self, what: CommandRecord | tuple[Correction, Timeline]) -> None:
-        before, self._timeline = self._timeline, self.operator.engine.timeline
+        before, self._timeline = self._timeline, self.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))
         if len(self._happened) >= _WAITING:
-            self._tell_happened()
+            self.tell_happened()
             self.write_out()
 
     def add(self, t: float, message: Message) -> None:
         """Let a message of a time [s] be written."""
         self._due.append((t, message))
 
-    def show(
-        self,
-        paced: Paced,
-        t: Array,
-        q: Array,
-        kinematics: Callable[[Array], Array],
-        message: Callable[[float, Array], Message],
-    ) -> None:
-        """Let a robot be shown, as often as it's due.
+    def show(self, paced: Paced, t: Array, q: Array, message: Callable[[float, Array, str], Message]) -> None:
+        """Let a robot's pose be shown, as often as it's due.
 
         Args:
             paced: Chooses when.
             t: Ascending times [s], (k,).
-            q: Joints [rad], (k, n).
-            kinematics: Poses (m, 4, 4), or of all links (m, n + 1, 4, 4), of joints (m, n).
-            message: Made of a time [s] and what the kinematics say of the joints then.
+            q: Joints or postures, (k, n).
+            message: Made of a time [s], the pose then, and the frame that it's in.
         """
         rows = paced.chosen(t, q)
         if rows:
-            for now, X in zip(t[rows].tolist(), kinematics(q[rows]), strict=True):
-                self.add(now, message(now, X))
+            for now, X in zip(t[rows].tolist(), self.kind.poses(self.model, q[rows]), strict=True):
+                self.add(now, message(now, X, self.kind.frame))
+
+    def show_links(self, paced: Paced, t: Array, **robots: Array) -> None:
+        """Let all links of robots, `virtual` and `real`, be shown at once; see `show`."""
+        rows = paced.chosen(t, np.hstack([*robots.values()]))
+        if rows:
+            times = t[rows].tolist()
+            chosen = {name: q[rows] for name, q in robots.items()}
+            for now, frames in zip(times, self.kind.frames(self.model, times, chosen), strict=True):
+                self.add(now, frames)
 
     def link(self, direction: Direction, records: Iterable[PacketRecord]) -> None:
         """Write down what became of packets, in the order in which it was known."""
@@ -189,11 +190,11 @@ class Capture(SiteObserver):
             t = self._linked[direction] = max(self._linked[direction], known)
             self.add(t, entry)
 
-    def advance(self, *, now: float) -> tuple[Array, Array]:
+    def sample(self, *, now: float) -> tuple[Array, Array]:
         """Write down what is due; the virtual robot's times [s], (k,), and joints [rad], (k, n), for the driver."""
-        self._tell_happened()
+        self.tell_happened()
         t = self._times(now)
-        q = self.operator.engine.timeline.sample(t)
+        q = self.engine.timeline.sample(t)
         self._sample(t, q)
         return t, q
 
@@ -218,15 +219,15 @@ class Capture(SiteObserver):
         return t
 
     def _sample(self, t: Array, q: Array) -> None:
-        edits = [(at, message.edit) for at, message in self._due if isinstance(message, ChangeEntry | HistoryEntry)]
+        edits = [(at, message.edit) for at, message in self._due if isinstance(message, EditEntry | HistoryEntry)]
         since = edits[0][1] - 1 if edits else self._edit
         places = np.searchsorted([at for at, _ in edits], t, side="right").tolist()
         numbers = [max(since, 0), *(number for _, number in edits)]
         for row, (now, joints) in enumerate(zip(t.tolist(), q.tolist(), strict=True)):
-            self.add(now, VirtualSample(now, joints, numbers[places[row]]))
-        self.show(self._pose, t, q, self.model.forward, virtual_pose)
+            self.add(now, self.kind.sample(now, joints, numbers[places[row]]))
+        self.show(self._pose, t, q, virtual_pose)
 
-    def _tell_happened(self) -> None:
+    def tell_happened(self) -> None:
         """Write down what was noted."""
         changed = False
         while self._happened:
@@ -251,7 +252,7 @@ class Capture(SiteObserver):
 
     def _revise(self) -> None:
         """Write down receipts that later commands changed."""
-        engine = self.operator.engine
+        engine = self.engine
         for command_id in list(self._known)[:-_WATCHED]:
             del self._known[command_id]
         for command_id, version in self._known.items():

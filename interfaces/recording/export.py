@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,9 +16,11 @@ from interfaces.messages.description import described
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import Anchor, ArcEntry, CommandPacket, CommandRecord, LinkEntry, RunEvent
 from interfaces.recording.history import arm_timeline
+from interfaces.recording.kinds import ARM
 from interfaces.recording.poses import quaternions
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.recording import Recording
 from interfaces.recording.track import ESTIMATED, MEASURED
+from interfaces.runs.summary import UNIT
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline
@@ -29,7 +30,6 @@ _POSE = "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"
 _POSTURE = "x_m", "y_m", "theta_rad"
 _DRIVE = "v_m_per_s", "w_rad_per_s"
 _STAMPS = "issued_at_s", "asked_at_s", "execute_at_s", "end_s"
-_UNIT = re.compile(r"_((?:s|m|rad_or_m|rad|byte)(?:_per_s\d*)?)$")
 _KINDS: dict[type, type] = {kinds.FloatType: float, kinds.IntType: int, kinds.BoolType: bool}
 
 
@@ -46,7 +46,7 @@ class TableColumn(NamedTuple):
     @property
     def unit(self) -> str:
         """Empty where there's none."""
-        found = _UNIT.search(self.name)
+        found = UNIT.search(self.name)
         return found[1].replace("_per_", "/") if found else ""
 
 
@@ -66,7 +66,7 @@ def _fields(kind: type, values: Sequence[Any], *names: str) -> list[TableColumn]
     types = {field.name: field.type for field in described(kind).fields}
     found = []
     for name in names:
-        field = _UNIT.sub("", name)
+        field = UNIT.sub("", name)
         cells = [None if value is None else getattr(value, field) for value in values]
         found.append(TableColumn(name, _KINDS.get(type(types[field]), str), cells))
     return found

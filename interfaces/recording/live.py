@@ -18,14 +18,13 @@ from interfaces.messages.sites import Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
 from interfaces.teleop import Correction, RobotLine
 from interfaces.teleop.samples import PERIOD
 from vrs.ledger import Receipt, Status
-from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 RATE = 60.0
@@ -56,71 +55,7 @@ class LiveRecording:
     """Whether a file that's there already is written over."""
 
 
-class _LiveCapture(Capture):
-    """A capture that knows the real robot by its reports."""
-
-    def __init__(self, line: RobotLine, model: RobotModel, now: float) -> None:
-        super().__init__(line.operator, model, now=now, step=1.0 / RATE, every=False, apart=True)
-        self._asked: OrderedDict[int, float] = OrderedDict()
-        self._since = now
-        self._samples: list[Sample] = []
-        self._halted = self._followed = False
-        self.failure = ""
-        """What raised while a note was taken; empty if nothing did."""
-
-    def commanded(self, deed: CommandRecord) -> None:
-        super().commanded(deed)
-        receipt = deed.receipt
-        if receipt is not None and receipt.status is not Status.REJECTED and receipt.execute_at is not None:
-            self._asked[receipt.command_id] = receipt.execute_at
-            if len(self._asked) > _ASKED:
-                self._asked.popitem(last=False)
-
-    def corrected(self, correction: Correction, truth: Timeline) -> None:
-        super().corrected(correction, truth)
-        for event in correction_events([correction], self.model.prismatic):
-            self.add(event.t, fields.cut(event))
-
-    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
-        super().answered(command_id, receipt, now=now)
-        asked = self._asked.pop(command_id, None)
-        if receipt.status is Status.REJECTED or receipt.execute_at is None:
-            self.tell(now, "diverged", f"the real robot rejected command {command_id}: {receipt.reason}")
-        elif asked is not None and receipt.execute_at > asked + _SAME:
-            late = f"executed at {receipt.execute_at:.3f} s instead of {asked:.3f} s"
-            self.tell(now, "late", f"command {command_id} was late at the real robot: {late}")
-
-    def reported(self, report: Report, *, now: float) -> None:
-        halted = bool(report.halted)
-        if halted and not self._halted and self._followed:
-            self.tell(now, "halted", f"the real robot stopped: {report.halted}")
-        elif not halted and (self._halted or not self._followed):
-            self.tell(now, "followed", "the real robot follows the operator")
-        self._halted, self._followed = halted, self._followed or not halted
-
-    @override
-    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
-        # What was measured before the recording began is compared with nothing in it.
-        self._samples += [one for one in samples if one.t >= self._since][: _SAMPLES - len(self._samples)]
-
-    def failed(self, error: Exception) -> None:
-        self.failure = str(error) or type(error).__name__
-
-    def tell(self, t: float, kind: str, text: str) -> None:
-        """Write down an event."""
-        self.add(t, RunEvent(t, kind, fields.text(text)))
-
-    def show_links(self, robot: str, paced: Paced, t: Array, q: Array) -> None:
-        """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""
-        self.show(paced, t, q, self.model.links, lambda now, X: link_transforms(now, ((robot, X[1:]),)))
-
-    def samples(self) -> list[Sample]:
-        """Those that came since the last time, by time."""
-        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
-        return samples
-
-
-class LiveRecorder:
+class LiveRecorder(Capture):
     """Records an operator's site. `advance` takes its turns; a thread of the recorder's does the writing.
 
     It begins with a session, or in its middle; takes notes from when it's made, and writes once `open` has made a
@@ -131,7 +66,6 @@ class LiveRecorder:
         self,
         what: LiveRecording,
         line: RobotLine,
-        model: RobotModel,
         *,
         seed: int,
         began: float,
@@ -142,22 +76,23 @@ class LiveRecorder:
         Args:
             what: What is recorded, and where to.
             line: From the operator's site to the robot; nobody else listens to that site.
-            model: The robot.
             seed: Of the emulated link.
             began: Seconds since 1970 now.
             now: Session time [s].
         """
+        self._site, engine = line.operator, line.operator.robot.engine
+        super().__init__(engine, now=now, step=1.0 / RATE, every=False, apart=True)
+        self._site.listener = self
         self.path, self.since = what.path, now
-        self._what, self._line, self._failed = what, line, what.failed
-        self._capture = _LiveCapture(line, model, now)
+        self._what, self._link = what, line.link
         for way in (line.link.forward, line.link.backward):
             way.log.take()
-        link, engine = line.link.conditions.forward, line.operator.engine
+        link, name = line.link.conditions.forward, engine.model.name
         self._begin = Begin(
             t=now,
-            robot=model.name,
+            robot=name,
             driver="live",
-            title=f"live {model.name}",
+            title=f"live {name}",
             seed=seed,
             delay=fields.text(link.delay.name),
             offset=what.offset,
@@ -169,13 +104,15 @@ class LiveRecorder:
             software=software(),
             began=began,
             sampled=PERIOD,
-            late=late_of(self._capture.late),
+            late=late_of(self.late),
         )
         self.recorder: Recorder | None = None
         """Writes the file, once there is one."""
+        self._asked: OrderedDict[int, float] = OrderedDict()
+        self._samples: list[Sample] = []
         self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
-        self._connected = self._told = False
-        self._stopped = ""
+        self._connected = self._halted = self._followed = False
+        self._stopped, self._told = "", False
         self._rest: tuple[End, tuple[Receipt, ...]] | None = None
 
     def open(self) -> None:
@@ -186,18 +123,17 @@ class LiveRecorder:
         """
         sink = Sink.create(self.path, over=self._what.over)
         try:
-            self.recorder = Recorder(sink, self._begin, first=self._capture.first())
+            self.recorder = Recorder(sink, self._begin, first=self.first())
         except RecordingError:
             self.leave()
             raise
-        self._capture.put = self.recorder.put
+        self.put = self.recorder.put
 
     def leave(self) -> None:
         """Listen no more."""
-        capture = self._capture
-        capture.put = None
-        if capture.operator.listener is capture:
-            capture.operator.listener = None
+        self.put = None
+        if self._site.listener is self:
+            self._site.listener = None
 
     def advance(self, *, now: float, connected: bool) -> None:
         """Write down what is due at a time [s].
@@ -206,39 +142,80 @@ class LiveRecorder:
             now: Session time [s].
             connected: Whether the robot is heard of.
         """
-        capture = self._capture
-        if capture.failure and not self._stopped:
-            self.stop(capture.failure)
-        if capture.put is None:
+        if self.put is None:
             return
         self._look()
         if connected is not self._connected:
             self._connected = connected
             text = "the real robot is heard of" if connected else "the real robot isn't heard of any more"
-            capture.tell(now, "up" if connected else "down", text)
-        link = self._line.link
-        capture.link("forward", link.forward.log.take())
-        capture.link("backward", link.backward.log.take())
-        capture.show_links("virtual", capture.links, *capture.advance(now=now))
-        self._tell_samples(capture)
-        capture.write_out()
+            self.tell(now, "up" if connected else "down", text)
+        self.link("forward", self._link.forward.log.take())
+        self.link("backward", self._link.backward.log.take())
+        t, q = self.sample(now=now)
+        self.show_links(self.links, t, virtual=q)
+        self._write_samples()
+        self.write_out()
 
-    def _tell_samples(self, capture: _LiveCapture) -> None:
-        samples = capture.samples()
+    def _write_samples(self) -> None:
+        """Write down what was measured of the real robot since the last time."""
+        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
         if not samples:
             return
         t = np.array([sample.t for sample in samples])
         q = np.array([sample.q for sample in samples])
         for now, joints, sample in zip(t.tolist(), q.tolist(), samples, strict=True):
             reference = None if sample.reference is None else sample.reference.tolist()
-            capture.add(now, RealSample(now, sample.play, joints, reference))
-        capture.show(self._real, t, q, capture.model.forward, real_pose)
-        capture.show_links("real", self._real_links, t, q)
+            self.add(now, RealSample(now, sample.play, joints, reference))
+        self.show(self._real, t, q, real_pose)
+        self.show_links(self._real_links, t, real=q)
+
+    @override
+    def commanded(self, deed: CommandRecord) -> None:
+        super().commanded(deed)
+        receipt = deed.receipt
+        if receipt is not None and receipt.status is not Status.REJECTED and receipt.execute_at is not None:
+            self._asked[receipt.command_id] = receipt.execute_at
+            if len(self._asked) > _ASKED:
+                self._asked.popitem(last=False)
+
+    @override
+    def corrected(self, correction: Correction, truth: Timeline) -> None:
+        super().corrected(correction, truth)
+        for event in correction_events([correction], self.model.prismatic):
+            self.add(event.t, fields.cut(event))
+
+    @override
+    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
+        super().answered(command_id, receipt, now=now)
+        asked = self._asked.pop(command_id, None)
+        if receipt.status is Status.REJECTED or receipt.execute_at is None:
+            self.tell(now, "diverged", f"the real robot rejected command {command_id}: {receipt.reason}")
+        elif asked is not None and receipt.execute_at > asked + _SAME:
+            late = f"executed at {receipt.execute_at:.3f} s instead of {asked:.3f} s"
+            self.tell(now, "late", f"command {command_id} was late at the real robot: {late}")
+
+    @override
+    def reported(self, report: Report, *, now: float) -> None:
+        halted = bool(report.halted)
+        if halted and not self._halted and self._followed:
+            self.tell(now, "halted", f"the real robot stopped: {report.halted}")
+        elif not halted and (self._halted or not self._followed):
+            self.tell(now, "followed", "the real robot follows the operator")
+        self._halted, self._followed = halted, self._followed or not halted
+
+    @override
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
+        # What was measured before the recording began is compared with nothing in it.
+        self._samples += [one for one in samples if one.t >= self.since][: _SAMPLES - len(self._samples)]
+
+    @override
+    def failed(self, error: Exception) -> None:
+        self.stop(str(error) or type(error).__name__)
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event of a kind at a time [s]."""
         if not self._stopped:
-            self._capture.tell(t, kind, text)
+            self.add(t, RunEvent(t, kind, fields.text(text)))
 
     @property
     def problem(self) -> str | None:
@@ -254,8 +231,8 @@ class LiveRecorder:
     def _look(self) -> None:
         """Tell of a problem that's new."""
         problem = self.problem
-        if problem and not self._told and self._failed is not None:
-            self._failed(problem)
+        if problem and not self._told and self._what.failed is not None:
+            self._what.failed(problem)
         self._told = problem is not None
 
     def finish(self, *, now: float) -> None:
@@ -268,7 +245,7 @@ class LiveRecorder:
         receipts: tuple[Receipt, ...] = ()
         if not self._stopped:
             self.advance(now=now, connected=self._connected)
-            receipts = self._capture.operator.engine.receipts
+            receipts = self.engine.receipts
             late = self._begin.late
             if late is not None:
                 receipts = tuple(one for one in receipts if one.command_id > late.newest)
@@ -277,7 +254,7 @@ class LiveRecorder:
 
     def close(self) -> None:
         """Write the last notes down, and close the file; from any thread, after `end`."""
-        recorder, capture = self.recorder, self._capture
+        recorder = self.recorder
         assert self._rest is not None
         end, receipts = self._rest
         if recorder is None:
@@ -286,9 +263,9 @@ class LiveRecorder:
             # What happened since isn't there: the file isn't whole.
             recorder.close(None)
         else:
-            capture.receipts(end.t, "virtual", receipts)
-            capture.whole(end.t)
-            recorder.close(end, last=[message for _, message in capture.taken()])
+            self.receipts(end.t, "virtual", receipts)
+            self.whole(end.t)
+            recorder.close(end, last=[message for _, message in self.taken()])
         self._look()
 
     def health(self) -> dict[str, Any]:

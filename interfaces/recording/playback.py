@@ -13,8 +13,9 @@ from typing_extensions import override
 
 from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
 from interfaces.recording.figures import Follower, Pursuit
+from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader
-from interfaces.recording.recording import ARM, Recording, check_alike
+from interfaces.recording.recording import Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
 from vrs.commands import finite
 from vrs.errors import FormatError, InvalidValueError

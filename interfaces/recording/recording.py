@@ -1,16 +1,16 @@
-"""A recording that's open for reading, and the kinds of robots that recordings are of."""
+"""A recording that's open for reading."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,9 +31,10 @@ from interfaces.messages.recording import (
 )
 from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
-from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
-from robots.robot import Robot, load, names
+from interfaces.recording.track import Log, SampleTrack, Tracks
+from robots.robot import BARE, Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
@@ -41,30 +42,6 @@ from vrs.segment import times
 
 POSTURE = 3
 """Numbers of a posture."""
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingKind:
-    """A kind of robot, as recordings know it."""
-
-    name: str
-    """For people, with its article."""
-    word: str
-    """For programs."""
-    virtual: str
-    """Topic of the virtual robot's samples."""
-    real: str
-    """Topic of the real robot's."""
-    unit: str
-    """Of how far the real robot is from the virtual one: `rad` or `m`."""
-    state: str
-    """What an engine calls where it begins."""
-
-
-ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad", "q")
-"""Joints, and polynomials on its timeline."""
-MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m", "posture")
-"""Postures, and arcs on its timeline."""
 
 
 def shows(begin: Begin) -> list[str]:
@@ -183,9 +160,8 @@ class Recording:
             FormatError: If it's none that is known here, or has other joints.
         """
         begin = self.session
-        # Mobile robots of one family have its name, and a body of their own.
-        own = begin.drive is not None and begin.drive.body in names()
-        name = begin.drive.body if own and begin.drive is not None else begin.robot
+        # Mobile robots of one family have its name as their model's, and a name of their own.
+        name = begin.robot if begin.drive is None or begin.drive.body == BARE else begin.drive.body
         robot = self._robot
         if (robot is None or robot.name != name) and name in names():
             robot = load(name)

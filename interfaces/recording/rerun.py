@@ -12,7 +12,8 @@ import numpy as np
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import Anchor, CommandRecord, Late
 from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries
-from interfaces.recording.recording import MOBILE, Recording
+from interfaces.recording.kinds import MOBILE
+from interfaces.recording.recording import Recording
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine

@@ -12,8 +12,8 @@ import numpy as np
 
 from interfaces.lab.driving.output import of_drives
 from interfaces.messages.recording import RunEvent
-from interfaces.recording.figures import driven, figures_of
-from interfaces.recording.figures import figures as run_figures
+from interfaces.recording.figures import RunFigures
+from interfaces.recording.figures import figures as figures_of
 from interfaces.recording.recording import Recording
 from interfaces.report.pages import page
 from interfaces.report.plots import plots
@@ -187,8 +187,7 @@ def render_recording(recording: Recording) -> tuple[str, tuple[str, ...]]:
     Raises:
         FormatError: If the recording has too little of it.
     """
-    if recording.session.drive is None:
-        arm = run_figures(recording)
-        return render(arm.run, summarize(arm.run, arm.attributions, arm.offsets)), arm.missing
-    found = driven(recording)
-    return render_drive(found.drive, figures_of(recording, found), recording.events), found.missing
+    found = figures_of(recording)
+    if isinstance(found, RunFigures):
+        return render(found.run, found.summary()), tuple(found.missing)
+    return render_drive(found.run, found.summary(), recording.events), tuple(found.missing)

@@ -9,6 +9,7 @@ import numpy as np
 
 from interfaces.link.link import Link
 from interfaces.messages.drive_sites import ArchitectureReport, ArcPacket
+from interfaces.messages.recording import Direction
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
@@ -47,6 +48,8 @@ class DriveCase:
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""
+    known: Robot | None = field(default=None, repr=False, compare=False)
+    """The robot, where somebody has it; else it's found by what `robot` says."""
 
     @property
     def group(self) -> tuple[str, str, str, str, str]:
@@ -61,7 +64,9 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        return (load(USUAL_BASE), BARE) if self.robot == BARE else (load(self.robot), "")
+        if self.robot == BARE:
+            return load(USUAL_BASE), BARE
+        return load(self.robot) if self.known is None else self.known, ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
@@ -129,7 +134,7 @@ class Witness(Protocol):
     ) -> None:
         """The run begins; the site and the link tell those who listen."""
 
-    def sent(self, direction: str, now: float, size: int) -> None:
+    def sent(self, direction: Direction, now: float, size: int) -> None:
         """A packet of so many bytes goes `forward` or `backward` now [s]."""
 
 

@@ -15,6 +15,7 @@ from interfaces.link import Link, LinkConditions
 from interfaces.messages.sites import Orders, Report
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.robot import JointReference, RobotSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from robots.onboard.playout import PlayState
 from robots.robot import ArmBody
 from vrs.commands import finite
@@ -84,7 +85,7 @@ class Laboratory:
 
     def __init__(
         self,
-        operator: OperatorSite,
+        operator: OperatorSite[VirtualArm],
         robot: RobotSite,
         conditions: LinkConditions,
         rng: np.random.Generator,

@@ -1,12 +1,6 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
-from interfaces.teleop.operator import (
-    Correction,
-    OperatorSite,
-    OperatorSiteConfig,
-    RobotLine,
-    SiteObserver,
-)
+from interfaces.teleop.operator import Correction, OperatorSite, SiteObserver, VirtualRobot
 from interfaces.teleop.robot import (
     AdaptiveOffset,
     JointReference,
@@ -16,6 +10,7 @@ from interfaces.teleop.robot import (
     RobotSite,
     RobotSiteConfig,
 )
+from interfaces.teleop.virtual_arm import OperatorSiteConfig, RobotLine, VirtualArm
 
 __all__ = [
     "AdaptiveOffset",
@@ -30,4 +25,6 @@ __all__ = [
     "RobotSite",
     "RobotSiteConfig",
     "SiteObserver",
+    "VirtualArm",
+    "VirtualRobot",
 ]  # fmt: skip

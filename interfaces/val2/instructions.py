@@ -36,7 +36,7 @@ from interfaces.val2.expressions import Expressions, kind_of
 from interfaces.val2.functions import OPERATORS, whole
 from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
-from interfaces.val2.rows import Form, OperandSlot
+from interfaces.val2.rows import Form, OperandSlot, Origin
 from interfaces.val2.signals import reaction_to
 from interfaces.val2.structure import structure
 from interfaces.val2.syntax import (
@@ -142,6 +142,10 @@ def _approach(c: Context, i: Instruction, location: Location, height: float) -> 
 
 def _depart(c: Context, i: Instruction, distance: float) -> None:
     c.arm.depart(distance, straight=i.keyword == "DEPARTS", now=c.now)
+
+
+def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: float) -> None:
+    c.arm.drive(int(joint), angle, percent, now=c.now)
 
 
 def _check_drive(c: Context, _: Instruction, joint: float, _angle: float, percent: float) -> None:
@@ -690,29 +694,36 @@ def _wanted(names: tuple[Variable, ...]) -> str:
 
 # The table.
 
+
+def _movement(
+    name: str, spelled: str, explanation: str, do: Do, check: Do | None = None, *, origin: Origin = "VAL"
+) -> Form:
+    """The row of a motion, before which AT may stand."""
+    return Form(name, spelled, explanation, origin, _motion(do, check), rule="motion")
+
+
 _ROWS: Final = (
     # Motions.
-    Form("MOVE", "location:location", "Move to a location, the joints together.", "VAL", _motion(_move)),
-    Form("MOVES", "location:location", "Move the tool to a location on a straight line.", "VAL", _motion(_move)),
-    Form("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", "VAL",
-         _motion(_move)),
-    Form("MOVEST", "location:location, opening", "MOVET on a straight line.", "VAL", _motion(_move)),
-    Form("APPRO", "location:location, distance", "Move to a distance [mm] behind a location, along its tool axis.",
-         "VAL", _motion(_approach)),
-    Form("APPROS", "location:location, distance", "APPRO on a straight line.", "VAL", _motion(_approach)),
-    Form("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.", "VAL",
-         _motion(_depart)),
-    Form("DEPARTS", "distance", "DEPART on a straight line.", "VAL", _motion(_depart)),
-    Form("DRIVE", "joint:joint, change, speed:percent", "Turn one joint by a change [deg] at a speed [%].", "VAL",
-         _motion(lambda c, _, joint, *how: c.arm.drive(int(joint), *how, now=c.now), _check_drive)),
-    Form("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].", "VAL",
-         _motion(lambda c, _, *way: c.arm.draw(*way, now=c.now))),
-    Form("READY", "", "Move to the ready position: the arm straight up.", "VAL",
-         _motion(lambda c, _: c.arm.go_ready(now=c.now))),
-    Form("NEST", "", "Move to the position in which the arm is parked.", "VAL-II",
-         _motion(lambda c, _: c.arm.nest(now=c.now))),
-    Form("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.", "VAL",
-         _motion(lambda c, _: c.arm.align(now=c.now))),
+    _movement("MOVE", "location:location", "Move to a location, the joints together.", _move),
+    _movement("MOVES", "location:location", "Move the tool to a location on a straight line.", _move),
+    _movement("MOVET", "location:location, opening", "MOVE, the hand to an opening [mm], TRUE, FALSE.", _move),
+    _movement("MOVEST", "location:location, opening", "MOVET on a straight line.", _move),
+    _movement("APPRO", "location:location, distance",
+              "Move to a distance [mm] behind a location, along its tool axis.", _approach),
+    _movement("APPROS", "location:location, distance", "APPRO on a straight line.", _approach),
+    _movement("DEPART", "distance", "Move back by a distance [mm] along the tool axis, from the destination.",
+              _depart),
+    _movement("DEPARTS", "distance", "DEPART on a straight line.", _depart),
+    _movement("DRIVE", "joint:joint, change, speed:percent", "Turn one joint by a change [deg] at a speed [%].",
+              _drive, _check_drive),
+    _movement("DRAW", "dx?=0, dy?=0, dz?=0", "Move straight by a way in world axes [mm].",
+              lambda c, _, *way: c.arm.draw(*way, now=c.now)),
+    _movement("READY", "", "Move to the ready position: the arm straight up.",
+              lambda c, _: c.arm.go_ready(now=c.now)),
+    _movement("NEST", "", "Move to the position in which the arm is parked.", lambda c, _: c.arm.nest(now=c.now),
+              origin="VAL-II"),
+    _movement("ALIGN", "", "Turn the tool's axis to the nearest axis of the world.",
+              lambda c, _: c.arm.align(now=c.now)),
     Form("DELAY", "seconds:seconds", "Stand still for a time, as a motion.", "VAL",
          _motion(lambda c, _, seconds: c.arm.delay(seconds, now=c.now))),
     Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(_nothing)),
@@ -723,7 +734,7 @@ _ROWS: Final = (
     # Settings.
     Form("SPEED", "speed:speed, turning:percent?",
          "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.", "VAL", _now(_speed),
-         words="MMPS|IPS|MONITOR ALWAYS", tags="beside"),
+         words="MMPS|IPS|MONITOR ALWAYS", rule="speed", tags="beside"),
     Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate),
          rule="channel"),
     Form("DURATION", "seconds:seconds", "Shortest time of the next motion; ALWAYS: each.", "V+",
@@ -779,11 +790,11 @@ _ROWS: Final = (
          _grasp),
     # Locations.
     Form("SET", "variable:variable, location:location", "Assign a location.", "VAL", _set,
-         usage="SET variable = location", tags="beside", rule="assignment"),
+         usage="SET variable = location", tags="beside", rule="set"),
     Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", _here,
          tags="beside"),
     Form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
-         "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside", rule="assignment"),
+         "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside", rule="set"),
     Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", _passed,
          usage="SHIFT variable BY dx, dy, dz", rule="shift"),
     # Signals and time.
@@ -795,23 +806,22 @@ _ROWS: Final = (
     Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
          usage="TIMER number = seconds", tags="beside", rule="timing"),
     Form("REACT", "signal:signal, program:program?",
-         "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS",
-         rule="reaction"),
+         "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS"),
     Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
-         words="ALWAYS", rule="reaction"),
+         words="ALWAYS"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
          _now(lambda c, _, signal: c.reactions.ignore(signal))),
     # Control.
     Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program", rule="branch"),
     Form("ELSE", "", "Do steps if the condition of IF doesn't hold.", "VAL-II", _divide,
-         tags="opens closes program", rule="nothing"),
-    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", _end, tags="closes program", rule="nothing"),
+         tags="opens closes program"),
+    Form("END", "", "The end of IF, WHILE, FOR or CASE.", "VAL-II", _end, tags="closes program", rule="end"),
     Form("WHILE", "condition:condition", "Repeat steps as long as a condition holds.", "VAL-II", _if,
          usage="WHILE condition DO .. END", tags="opens program", rule="while"),
     Form("DO", "", "Repeat steps until a condition holds.", "VAL-II", _passed, usage="DO .. UNTIL condition",
-         tags="opens program", rule="nothing"),
-    Form("UNTIL", "condition:condition", "The end of DO.", "VAL-II", _if, tags="closes program", rule="until"),
+         tags="opens program"),
+    Form("UNTIL", "condition:condition", "The end of DO.", "VAL-II", _if, tags="closes program"),
     Form("FOR", "variable:variable, start, stop, step?", "Repeat steps, counting.", "VAL-II", _for,
          usage="FOR variable = start TO stop [STEP step] .. END", tags="opens program", rule="loop"),
     Form("CASE", "value:any", "Do the steps of one of several values.", "VAL-II", _case,
@@ -819,24 +829,23 @@ _ROWS: Final = (
     Form("VALUE", "value:any*", "What of a CASE is done for these values.", "VAL-II", _divide,
          usage="VALUE value, ..:", tags="opens closes program", rule="values"),
     Form("ANY", "", "What of a CASE is done for any other value.", "VAL-II", _divide, tags="opens closes program",
-         rule="nothing"),
-    Form("EXIT", "count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program", rule="loops"),
-    Form("NEXT", "count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump, tags="program",
-         rule="loops"),
-    Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program", rule="goto"),
+         rule="values"),
+    Form("EXIT", "count:count?", "Leave the innermost loop, or as many.", "VAL-II", _jump, tags="program"),
+    Form("NEXT", "count:count?", "Go on with the next turn of the innermost loop.", "VAL-II", _jump,
+         tags="program"),
+    Form("GOTO", "label:label", "Go on at a label.", "VAL", _jump, tags="program"),
     Form("CALL", "argument:any?*", "Call a program; arguments by reference.", "VAL-II", _call,
          usage="CALL program(argument, ..)", rule="call"),
     Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program", rule="call"),
-    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program", rule="nothing"),
+    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program"),
     Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
     Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
     Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
     # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
          rule="items"),
-    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt,
-         rule="prompt"),
-    Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text"),
+    Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt),
+    Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text", rule="remark"),
     Form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", _passed,
          usage="AUTO [REAL|LOC] name, ..", tags="program", rule="names"),
     Form("LOCAL", "name:variable*", "Names of this program alone.", "V+", _passed,

@@ -7,11 +7,10 @@ from collections.abc import Generator, Sequence
 from functools import lru_cache
 from typing import Final, TypeAlias, TypeVar
 
-from interfaces.val2 import forms, grammar, statements
+from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.printer import print_step
 from interfaces.val2.rows import nearest
-from interfaces.val2.statements import HIGHEST_LABEL, OperandText
 from interfaces.val2.syntax import (
     BLANK,
     Expression,
@@ -34,10 +33,8 @@ _SURELY_SHORT: Final = 120
 _INDENTED: Final = 250
 """Columns that structures may indent a line by, and a label."""
 _BREAK: Final = re.compile(r"[\r\n]")
+_BEFORE: Final = re.compile(r"\s*([0-9]+(?![A-Za-z0-9_.]))?\s*")
 _CODE: Final = re.compile(r'(?:[^";]|"[^"]*")*')
-_LABEL: Final = re.compile(r"\s*([0-9]+)(?![A-Za-z0-9_.])\s*")
-_HEAD: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*(\[|=(?!=))?")
-_REMARK: Final = re.compile(r"\s*(?:[0-9]+\s+)?(REMARK)(?![A-Za-z0-9_.])\s?(?!\s*[=\[])", re.IGNORECASE | re.ASCII)
 _HEADER: Final = re.compile(r"\s*\.PROGRAM(?![A-Za-z0-9_.])\s*", re.IGNORECASE | re.ASCII)
 _PROGRAM_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
 _PARAMETER: Final = re.compile(r"\s*([#$]?[A-Za-z][A-Za-z0-9_.]*)\s*(\[[\s,]*\])?\s*")
@@ -90,26 +87,10 @@ def _check_one_line(text: str, line: int) -> None:
 @lru_cache(maxsize=8192)
 def cached_step(text: str, line: int) -> Step:
     """The step of a line that is short enough; files repeat their lines."""
-    if remark := _REMARK.match(text):
-        label, _ = _label(text, line)
-        return Step(BLANK, label, text[remark.end() :].rstrip(), TextPosition(line, remark.start(1) + 1))
-    code, comment = split_comment(text, line)
-    label, begin = _label(code, line)
-    found = _HEAD.match(code, begin)
-    if found is None:
-        begin = indented(code, begin)
-        if begin < len(code):
-            detail = f"unexpected {code[begin]!r}; allowed: an instruction, or a variable and '='"
-            raise syntax_error(detail, line, begin + 1)
-        return Step(BLANK, label, comment, TextPosition(line, 1))
-    at = TextPosition(line, found.start(1) + 1)
-    keyword = found[1].upper()
-    if found[2]:
-        return Step(statements.assignment(OperandText(code, found.start(1), at)), label, comment, at)
-    rest = OperandText(code, found.end(1), at)
-    if keyword == "END" and not rest.empty:
-        rest, comment = OperandText("", found.end(1), at), text[found.end(1) :].strip()
-    return Step(statements.statement(keyword, rest), label, comment, at)
+    label, statement, comment = grammar.read(text, "line", line)
+    found = _BEFORE.match(text)
+    begin = 0 if found is None or text[found.end() :][:1] in ("", ";") else found.end()
+    return Step(statement, label, comment, TextPosition(line, begin + 1))
 
 
 def split_comment(text: str, line: int) -> tuple[str, str | None]:
@@ -128,16 +109,6 @@ def split_comment(text: str, line: int) -> tuple[str, str | None]:
     return code, comment.rstrip() if semicolon else None
 
 
-def _label(code: str, line: int) -> tuple[int | None, int]:
-    """The label of a line, and where what stands behind it begins."""
-    found = _LABEL.match(code)
-    if found is None:
-        return None, 0
-    if len(found[1].lstrip("0")) > len(str(HIGHEST_LABEL)) or int(found[1]) > HIGHEST_LABEL:
-        raise syntax_error(f"allowed: 0 to {HIGHEST_LABEL}", line, found.start(1) + 1, "Invalid label")
-    return int(found[1]), found.end()
-
-
 def parse_expression(text: str) -> Expression:
     """The expression of a text.
 
@@ -145,7 +116,8 @@ def parse_expression(text: str) -> Expression:
         ValError: If it isn't one.
     """
     _check_one_line(text, 1)
-    return grammar.expression(grammar.read(text, "expression", 1), 1)
+    expression: Expression = grammar.read(text, "expression", 1)
+    return expression
 
 
 def parse_program(text: str) -> Program:

@@ -135,7 +135,7 @@ def print_statement(statement: Instruction) -> str:
         return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
     keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
     match STATEMENTS[keyword].rule, [_item(operand) for operand in statement.operands]:
-        case "assignment" | "timing", [target, value]:
+        case "assignment" | "set" | "timing", [target, value]:
             return f"{keyword} {target} = {value}".removeprefix("= ")
         case "parameter", [value]:
             return f"{keyword} {words[0]} = {value}"
@@ -147,12 +147,12 @@ def print_statement(statement: Instruction) -> str:
             return " ".join([f"{keyword} {variable} = {start} TO {stop}", *(f"STEP {by}" for by in step)])
         case "case", [value]:
             return f"{keyword} {value} OF"
-        case "values", _:
+        case "values", [*_, _]:
             return f"{keyword} {listed}:"
         case "call", given:
             return f"{keyword} {statement.program}" + (f"({listed})" if given or keyword == "CALL" else "")
-        case "reaction", [signal]:
-            listed = f"{signal}, {statement.program}" if statement.program else signal
+        case "worded", [signal] if statement.program:
+            listed = f"{signal}, {statement.program}"
         case "switches", _:
             return f"{keyword} {', '.join(words)}"
         case "names", _:

@@ -15,7 +15,8 @@ from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
     "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "signal", "output",
-    "string", "alike", "location", "frame", "point", "any", "label", "program", "variable", "array", "name", "text",
+    "string", "alike", "location", "frame", "point", "any", "label", "count", "program", "variable", "array",
+    "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
 what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
@@ -60,7 +61,7 @@ class Form:
         *,
         words: str = "",
         usage: str = "",
-        rule: str = "operands",
+        rule: str = "",
         tags: str = "",
         level: int = TIGHTEST,
     ) -> None:
@@ -77,8 +78,8 @@ class Form:
                 of a step; of a monitor command, takes the terminal and what follows the name.
             words: What may stand behind the operands, in their order, one of each group at most: `MMPS|IPS ALWAYS`.
             usage: How it's written, where that isn't told by the slots.
-            rule: What stands behind an instruction's keyword: a rule of `grammar.lark`, or what `statements.py`
-                reads; operands between commas, and words, if nothing is said.
+            rule: How an instruction's line goes on behind its keyword: what `grammar.lark` has behind this word, in
+                upper case; operands between commas, and words, if nothing is said.
             tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
                 and its name can't be a variable's), `context` (its first argument is the context), `idle` (it's
                 recognised, but has no meaning here: 0, or an empty string); of an instruction `opens`, `closes` (a
@@ -88,7 +89,7 @@ class Form:
         """
         operands, _, gives = spelled.partition("-> ")
         self.name, self.help, self.origin, self.act, self.level = name, explanation, origin, act, level
-        self.rule = rule
+        self.rule = rule or ("worded" if words else "operands")
         self.tags = frozenset(tags.split())
         self.gives = gives
         """Of a function: a kind, or `truth`."""

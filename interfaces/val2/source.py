@@ -163,8 +163,7 @@ def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
 def _entry(section: str, code: str, line: int) -> tuple[Variable, Value]:
     variable, begin = _variable(code, line, _PREFIXES[section])
     if section == ".STRINGS":
-        tree = grammar.read(" " * begin + code[begin:], "expression", line)
-        return variable, _constant(grammar.expression(tree, line))
+        return variable, _constant(grammar.read(" " * begin + code[begin:], "expression", line))
     if section == ".REALS":
         return variable, _numbers(code, begin, line, 1)[0]
     return variable, location_of(variable, _numbers(code, begin, line, 6))
@@ -202,24 +201,8 @@ def parse_rule(text: str, line: int = 1) -> SignalRule:
     Raises:
         ValError: If it isn't one.
     """
-    signal, _, value, *rest = grammar.read(text, "rule", line).children
-    number_of = grammar.number(signal, line)
-    place = TextPosition(line, signal.column)
-    if not number_of.is_integer():
-        raise ValError("Illegal digital signal", str(signal), place=place)
-    times: dict[str, float] = {}
-    for word, seconds in zip(rest[::2], rest[1::2], strict=True):
-        if word.type in times:
-            raise syntax_error(f"a second {word}", line, word.column)
-        times[word.type] = grammar.number(seconds, line)
-    return SignalRule(
-        int(number_of),
-        grammar.expression(value, line),
-        times.get("AFTER", 0.0),
-        times.get("FOR"),
-        times.get("AT"),
-        place,
-    )
+    rule: SignalRule = grammar.read(text, "cell", line)
+    return rule
 
 
 def print_rule(rule: SignalRule) -> str:

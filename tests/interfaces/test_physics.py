@@ -30,7 +30,7 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.runtime.physics_process import ParentSocket, tick_body
 from interfaces.teleop import JointReference, RobotSite
-from robots.robot import EXACT
+from robots.robot import IDEAL
 from tests.interfaces.test_teleop import laboratory
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, ROBOT, TICK, motion, sampled, standing
 from vrs import Engine, JointTarget, MotionCommand, Timeline, WallClock
@@ -77,7 +77,7 @@ def test_what_a_site_foresees_is_what_it_finds_after_a_stall(profile: str, D: fl
 
 
 def configured(**options: Any) -> PhysicsConfig:
-    return PhysicsConfig(ROBOT, NOMINAL, **({"body": EXACT} | options))
+    return PhysicsConfig(ROBOT, NOMINAL, **({"body": IDEAL} | options))
 
 
 def wait(physics: PhysicsProcess, clock: WallClock, until: Callable[[Event], bool], longest: float) -> list[Event]:
@@ -185,7 +185,7 @@ from robots import load
 from vrs.clock import WallClock
 robot = load("puma560")
 q, clock = np.array(robot.arm.poses["nominal"]), WallClock(0.0)
-physics = PhysicsProcess(PhysicsConfig(robot, q, body="exact"), clock)
+physics = PhysicsProcess(PhysicsConfig(robot, q, body="ideal"), clock)
 while not any(isinstance(e, PhysicsReady) for e in physics.poll(now=clock.now())):
     select.select([physics], [], [], 1.0)
 first, h = int(clock.now() / TICK) + 200, TICK * np.arange(1000)[:, None] * np.ones(6)

@@ -95,7 +95,7 @@ def test_what_the_diagrams_show_runs() -> None:
     assert serve - operators == set()
     # The body's process makes its loop so.
     limits = tuple(map(tuple, (MODEL.limits.q_min, MODEL.limits.q_max, *[MODEL.limits.qd_max] * 3)))
-    setup = PhysicsSetup("", "exact", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
+    setup = PhysicsSetup("", "ideal", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
     with tick_body(setup) as body:
         loop = TickLoop(body, MODEL.limits, tuple(NOMINAL), tick=0.001, every=10, now=0.0)
         in_process = reachable([loop])

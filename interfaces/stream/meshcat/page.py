@@ -51,7 +51,6 @@ class Viewers:
     def __init__(
         self,
         source: Newest,
-        admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         *,
         hear: Callable[[str], str] | None = None,
@@ -61,20 +60,18 @@ class Viewers:
 
         Args:
             source: What all of them see.
-            admit: Whether a WebSocket may be opened, by its headers; None for own pages, and programs.
             authorize: Whether a token lets a viewer in; None lets all in.
             hear: Takes what a viewer says; its answer, unless empty, goes to that one. None: nobody listens.
             most_heard: Messages that a viewer may send in 10 s.
         """
         self._source = source
-        self._admit = same_origin if admit is None else admit
         self._authorize, self._hear, self._most_heard = authorize, hear, most_heard
         self._viewers: set[_Viewer] = set()
         self._watcher: asyncio.Task[None] | None = None
 
     async def serve(self, websocket: WebSocket) -> None:
         """Serve one viewer until it goes."""
-        if not self._admit(websocket):
+        if not same_origin(websocket):
             await websocket.close()
             return
         batches = BATCHES in websocket.scope["subprotocols"]
@@ -243,20 +240,14 @@ PARTS: Final = ("meshcat.js", "scene.js", "licences.txt")
 _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".txt": "text/plain"}
 
 
-def routes(
-    scene: Newest,
-    *,
-    admit: Callable[[HTTPConnection], bool] | None = None,
-    authorize: Callable[[str | None], bool] | None = None,
-) -> list[BaseRoute]:
+def routes(scene: Newest, *, authorize: Callable[[str | None], bool] | None = None) -> list[BaseRoute]:
     """Make the routes of the page, of its files and of the WebSocket.
 
     Args:
         scene: What all viewers see.
-        admit: Whether a WebSocket may be opened, by its headers; None for this server's own pages, and programs.
         authorize: Whether a token lets a viewer in; None lets all in.
     """
-    viewers = Viewers(scene, admit, authorize)
+    viewers = Viewers(scene, authorize)
     return [*files("view", "interfaces.stream"), WebSocketRoute("/meshcat", viewers.serve)]
 
 

@@ -68,6 +68,9 @@ ARCHITECTURES: Final[dict[str, Architecture]] = {
     "timeline": lambda _, posture: TimelineController(posture, now=0.0),
 }
 """What makes each architecture's controller."""
+ESTIMATING: Final = ("I", "II", "III", "III-capped", "extended")
+"""Architectures whose virtual robot is drawn where the posture estimator has it, as the paper's are. Of
+`timeline` the real robot plays the operator's path: where his commands lead is where it comes to."""
 
 
 def architecture(name: str) -> Architecture:

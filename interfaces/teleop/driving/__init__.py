@@ -1,21 +1,16 @@
 """Both sites of a mobile robot that is driven live, round the parts of `interfaces.teleop.architectures`."""
 
 from interfaces.teleop.driving.autonomy import Autonomy, Hands, JourneyPilot, LaserSight, NavigatorPilot, Pilot
-from interfaces.teleop.driving.operator import Deviation, DriveLine, DrivingOperator, PathDeviation
 from interfaces.teleop.driving.robot import DrivenConfig, DrivenHost, DrivenRobot
 
 __all__ = [
     "Autonomy",
-    "Deviation",
-    "DriveLine",
     "DrivenConfig",
     "DrivenHost",
     "DrivenRobot",
-    "DrivingOperator",
     "Hands",
     "JourneyPilot",
     "LaserSight",
     "NavigatorPilot",
-    "PathDeviation",
     "Pilot",
 ]

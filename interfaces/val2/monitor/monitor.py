@@ -10,7 +10,7 @@ from typing import Final
 from interfaces.val2 import context
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, running
-from interfaces.val2.monitor.control import ControlState, SharedController, SharedOperator
+from interfaces.val2.monitor.control import ControlState, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.state import Dialogue, Expects, OutputText, Question, Style, TerminalState, split_word
 
@@ -37,7 +37,7 @@ class TerminalMonitor:
         *,
         queues_commands: bool = False,
         read_only: str = "",
-        person: SharedOperator | None = None,
+        session: str | None = None,
     ) -> None:
         """Begin; `start` greets.
 
@@ -48,10 +48,11 @@ class TerminalMonitor:
             queues_commands: Whether lines that can't be done while a program runs wait for its end; else they are
                 errors.
             read_only: Why this terminal only looks, whoever is in control.
-            person: Who sits here, where they command by a session of their own, too: control is theirs, and isn't
+            session: By which the person here commands from elsewhere, too: control is that session's, and isn't
                 asked for before a command needs it.
         """
-        self._person = person
+        self.session = session
+        """Whose right to command it asks for; None for the controller's own."""
         self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
         self._listener = self.take
         self.state = TerminalState(shared.controller, shared.control, files, version)
@@ -127,7 +128,7 @@ class TerminalMonitor:
         """Say what this is, and ask for control."""
         self.state.now = now
         self.state.say(f"{self.state.version}. HELP lists the commands.", style=Style.NOTE)
-        if self._person is None or self.read_only:
+        if self.session is None or self.read_only:
             self._control_due = now
         self.advance(now=now)
 
@@ -209,7 +210,7 @@ class TerminalMonitor:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self._listener, self.session, now=self.state.now)
             if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
                 self._control_due, self._pending = self.state.now + CONTROL_POLL, (command.name, text)
@@ -307,7 +308,7 @@ class TerminalMonitor:
 
     def _settle_control(self) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self._listener, self.session, now=self.state.now)
         if answer is ControlState.PENDING:
             self._control_due = self.state.now + CONTROL_POLL
             return

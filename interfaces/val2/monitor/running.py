@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -14,8 +15,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, integer, named, pieces, unique
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
-from interfaces.val2.statements import timed
-from interfaces.val2.syntax import BLANK, Expression, Instruction
+from interfaces.val2.syntax import BLANK, Expression, Instruction, Step
 
 FOREVER: Final = -1
 """Cycles that never end."""
@@ -26,7 +26,10 @@ _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 
 def do(state: TerminalState, rest: str) -> None:
     """DO instruction; DO alone does the last again."""
-    step = state.step(rest) if rest else state.last_do
+    _carry_out(state, state.step(rest) if rest else state.last_do)
+
+
+def _carry_out(state: TerminalState, step: Step | None) -> None:
     if step is None or step.statement == BLANK:
         raise ValError("Missing argument", "DO what? An instruction follows, such as DO READY")
     state.last_do = step
@@ -35,17 +38,18 @@ def do(state: TerminalState, rest: str) -> None:
 
 def at(state: TerminalState, rest: str) -> None:
     """AT t, AT +t, before the next motion; AT t motion, AT t DO motion in one line."""
-    together, places = _AT.fullmatch(rest), timed(rest)
-    when, motion = rest, ""
+    step, together = None, _AT.fullmatch(rest)
     if together is not None:
-        when, motion = together[1], together[2]
-    elif places is not None:
-        when, motion = rest[: places[0]], rest[places[1] :]
-    t = state.number(when.removeprefix("+"))
-    state.controller.arm.at(state.now + t if when.startswith("+") else t)
+        time, step = state.expression(together[1]), state.step(together[2])
+    elif (timed := state.instruction("AT", rest)).statement.begins is not None:
+        time, step = timed.statement.begins, replace(timed, statement=replace(timed.statement, begins=None))
+    else:
+        (time,) = timed.statement.operands
+    t = state.number_of(time)
+    state.controller.arm.at(state.now + t if rest.startswith("+") else t)
     state.scheduling = True
-    if motion:
-        do(state, motion)
+    if step is not None:
+        _carry_out(state, step)
 
 
 def execute(state: TerminalState, rest: str) -> None:

@@ -15,6 +15,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.control import Control
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.parser import parse_expression, parse_line
+from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Expression, Number, Step, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value
 from vrs.errors import VrsError
@@ -318,9 +319,17 @@ class TerminalState:
         Raises:
             ValError: If it's something else.
         """
-        value = self.value(text)
+        return self.number_of(self.expression(text))
+
+    def number_of(self, expression: Expression) -> float:
+        """What an expression comes to, which is to be a number.
+
+        Raises:
+            ValError: If it's something else.
+        """
+        value = self.controller.evaluate(expression, now=self.now)
         if not isinstance(value, float):
-            raise ValError("Invalid argument", f"{text}: a number is wanted")
+            raise ValError("Invalid argument", f"{print_expression(expression)}: a number is wanted")
         return value
 
     def variable(self, text: str) -> Variable:

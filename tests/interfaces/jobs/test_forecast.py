@@ -62,14 +62,14 @@ def test_the_prediction_is_about_what_happens() -> None:
     rig.begin()
     jobs = JobList((VoiceJob(1, "Good morning"), MoveJob(2, Goal(7.0, 1.0, 0.0)), MoveJob(3, Goal(2.0, 2.0))))
     predicted = time_needed(dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits))
-    rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     began = rig.now - 1.0
-    while rig.operator.doing is not Doing.NOTHING:
+    while rig.operator.robot.doing is not Doing.NOTHING:
         rig.run(0.2)
         assert rig.now < began + 3 * predicted
-    assert rig.operator.tasks is not None
-    assert rig.operator.tasks.progress.stage is JobStage.DONE
+    assert rig.operator.robot.tasks is not None
+    assert rig.operator.robot.tasks.progress.stage is JobStage.DONE
     assert rig.now - began == pytest.approx(predicted, rel=0.15)
 
 

@@ -193,8 +193,8 @@ def test_words_are_keywords_only_where_they_can_stand():
     [
         ("MOVE", 5, "*Missing argument* location; allowed: MOVE location"),
         ("MOVE p, 2", 9, "*Too many arguments* allowed: MOVE location"),
-        ("  MOVE )", 8, "unexpected ')'; allowed: a value"),
-        ("MOVE p ALWAYS", 8, "unexpected ALWAYS; allowed: MOVE location"),
+        ("  MOVE )", 8, "unexpected ')'; allowed: MOVE location"),
+        ("MOVE p ALWAYS", 8, "unexpected 'ALWAYS'; allowed: MOVE location"),
         ("APPRO a", 8, "distance; allowed: APPRO location, distance"),
         ("SPEED 10 MMPS IPS", 15, "one of MMPS, IPS, MONITOR"),
         ("MVOE p", 1, "*Undefined instruction* MVOE; did you mean MOVE?"),
@@ -217,12 +217,12 @@ def test_words_are_keywords_only_where_they_can_stand():
         ("IF a GOTO x", 11, "allowed: a number"),
         ("ELSEIF x", 1, "ELSE on a line"),
         ("BREAK 3", 7, "*Too many arguments* allowed: BREAK"),
-        ("RETURN x", 8, "unexpected 'x' behind RETURN"),
+        ("RETURN x", 8, "*Too many arguments* allowed: RETURN"),
         ("CALL 3", 6, "allowed: a name"),
         ("CALL #p", 6, "the name of a program"),
         ("REACT 1001, $x", 13, "the name of a program"),
-        ('PROMPT "x", 3', 13, "variables behind the text"),
-        ("PARAMETER HAND.TIME", 20, "allowed: PARAMETER name = value"),
+        ('PROMPT "x", 3', 13, "allowed: a variable"),
+        ("PARAMETER HAND.TIME", 20, "allowed: '='; form: PARAMETER name = value"),
         ("x = 1E999", 5, "*Number too large* 1E999"),
         ("x = a AND OR", 11, "OR can't stand here"),
         ("%", 1, "unexpected '%'"),
@@ -423,7 +423,7 @@ def test_what_is_allowed_is_never_nothing():
     ("text", "allowed"),
     [
         ("30 ALWAYS", "an operator, ':', the end of the line"), ("30 )", "an operator, ':', the end of the line"),
-        ("NULL NULL", "an operator, '(', ':', '[', the end of the line"), ("(30", "')'"),
+        ("NULL NULL", "an operator, '(', ':', '[', the end of the line"), ("(30", "an operator, ')', ':'"),
     ],
 )  # fmt: skip
 def test_what_is_allowed_behind_an_expression(text, allowed):

@@ -13,14 +13,15 @@ from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, co
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.driving import (
     Autonomy,
-    DriveLine,
     DrivenConfig,
     DrivenHost,
     DrivenRobot,
-    DrivingOperator,
     Hands,
     JourneyPilot,
 )
+from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots import ipr
 from robots.ipr.chassis import IPR
 from robots.ipr.position import FusedPosition
@@ -61,7 +62,9 @@ class Rig:
         pilot = JourneyPilot(Journey(self.roads), lambda: self.body.time)
         self.hands = Hands() if arm is None else Hands(arm=arm)
         self.autonomy = Autonomy(pilot, self.hands, jobs)
-        self.operator = DrivingOperator(MODEL, Posture(0.0, 0.0, 0.0), now=0.0)
+        self.operator = OperatorSite(
+            VirtualBase(MODEL, Posture(0.0, 0.0, 0.0), now=0.0), halted=Halt(HaltCause.NOT_MET)
+        )
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
         self.line = DriveLine(self.operator, way, np.random.default_rng(1))
         self.line.connected = True
@@ -119,10 +122,10 @@ class Rig:
         """What wishes that, turn by turn."""
 
         def each(now: float) -> None:
-            assert self.operator.wish(v, w, issued_at=now, now=now) == ""
+            assert self.operator.robot.wish(v, w, issued_at=now, now=now) == ""
 
         return each
 
     def apart(self) -> float:
         """How far the real robot is from the virtual one [m]."""
-        return math.dist(self.truth[:2], self.operator.virtual(self.now)[:2])
+        return math.dist(self.truth[:2], self.operator.robot.virtual(self.now)[:2])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from interfaces.teleop.driving import PathDeviation
+from interfaces.teleop.deviation import PathDeviation
 from robots.onboard.driving import Posture
 from vrs.mobile.model import advanced
 from vrs.segment import ArcSegment

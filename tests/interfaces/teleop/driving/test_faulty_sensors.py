@@ -56,7 +56,7 @@ def rig(*, sound: bool = True) -> tuple[Rig, Spoilt, list[DriveReport]]:
 
 def asks(made: Rig) -> Callable[[float], object]:
     """What wishes to go ahead, whether it may or not."""
-    return lambda now: made.operator.wish(0.3, 0.0, issued_at=now, now=now)
+    return lambda now: made.operator.robot.wish(0.3, 0.0, issued_at=now, now=now)
 
 
 def check(made: Rig, reports: list[DriveReport]) -> None:
@@ -64,7 +64,7 @@ def check(made: Rig, reports: list[DriveReport]) -> None:
     postures += [report.report.posture for report in reports if report.report is not None]
     assert (np.abs(np.array(postures)) < 100).all()
     assert np.isfinite(np.array(made.drives)).all()
-    assert np.isfinite(made.operator.virtual(made.now)).all()
+    assert np.isfinite(made.operator.robot.virtual(made.now)).all()
 
 
 @pytest.mark.parametrize("bad", BAD)

@@ -47,7 +47,7 @@ def within_limits(rig: Rig) -> bool:
 
 
 def report(rig: Rig) -> tuple[JourneyState, str]:
-    tasks = rig.operator.tasks
+    tasks = rig.operator.robot.tasks
     assert tasks is not None
     return tasks.journey, tasks.reason
 
@@ -55,13 +55,13 @@ def report(rig: Rig) -> tuple[JourneyState, str]:
 def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
     rig = Rig()
     rig.begin()
-    assert rig.operator.order(RobotTask(go=THERE)) == ""
+    assert rig.operator.robot.order(RobotTask(go=THERE)) == ""
     rig.run(2.0)
     assert rig.operator.cause is HaltCause.BY_ITSELF
-    assert rig.operator.doing is Doing.GOAL
-    assert rig.operator.tasks is not None
-    assert rig.operator.tasks.route[-1] == (THERE.x, THERE.y)
-    assert rig.operator.virtual(rig.now) == rig.operator.report.posture  # type: ignore[union-attr]
+    assert rig.operator.robot.doing is Doing.GOAL
+    assert rig.operator.robot.tasks is not None
+    assert rig.operator.robot.tasks.route[-1] == (THERE.x, THERE.y)
+    assert rig.operator.robot.virtual(rig.now) == rig.operator.report.posture  # type: ignore[union-attr]
     rig.run(25.0)
     assert report(rig) == (JourneyState.ARRIVED, "")
     assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
@@ -76,12 +76,12 @@ def test_a_goal_is_reached_and_the_next_drive_begins_there() -> None:
 def test_a_goal_behind_a_wall_is_driven_round_it_and_one_in_it_is_refused_with_a_reason() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(RobotTask(go=FAR))
+    rig.operator.robot.order(RobotTask(go=FAR))
     rig.run(60.0)
     assert report(rig)[0] is JourneyState.ARRIVED
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    rig.operator.order(RobotTask(go=Goal(4.1, 1.0)))
+    rig.operator.robot.order(RobotTask(go=Goal(4.1, 1.0)))
     rig.run(1.0)
     state, reason = report(rig)
     assert state is JourneyState.FAILED
@@ -93,14 +93,14 @@ def test_a_goal_given_while_driving_waits_until_the_robot_rests_and_the_wheel_ta
     rig = Rig()
     rig.begin()
     rig.run(2.0, rig.wish(0.4, 0.3))
-    rig.operator.order(RobotTask(go=THERE))
+    rig.operator.robot.order(RobotTask(go=THERE))
     rig.run(4.0)
-    assert rig.operator.doing is Doing.GOAL
+    assert rig.operator.robot.doing is Doing.GOAL
     assert within_limits(rig)
     # A wish to stand takes nothing over; one to drive does.
-    rig.operator.wish(0.0, 0.0, issued_at=rig.now, now=rig.now)
-    assert rig.operator.doing is Doing.GOAL
-    assert HaltCause.STOPPED in rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
+    rig.operator.robot.wish(0.0, 0.0, issued_at=rig.now, now=rig.now)
+    assert rig.operator.robot.doing is Doing.GOAL
+    assert HaltCause.STOPPED in rig.operator.robot.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
     rig.run(3.0)
     assert rig.autonomy.doing is Doing.NOTHING
     assert stands(rig)
@@ -114,20 +114,20 @@ def test_what_is_told_arrives_on_a_bad_link_once_each_and_in_its_order() -> None
     rig.begin()
     rig.line.change(LinkConditions.symmetric(way), now=rig.now)
     jobs = JobList((VoiceJob(1, "Hello!"), MoveJob(2, THERE), WaitJob(3, 1.0)))
-    assert rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN)) == ""
+    assert rig.operator.robot.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN)) == ""
     rig.run(30.0)
-    tasks = rig.operator.tasks
+    tasks = rig.operator.robot.tasks
     assert tasks is not None
     assert tasks.progress.stage is JobStage.DONE
-    assert rig.operator.doing is Doing.NOTHING
+    assert rig.operator.robot.doing is Doing.NOTHING
 
 
 def test_a_stop_overrules_what_the_robot_hasnt_heard_yet_and_the_numbers_go_on() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(RobotTask(go=THERE), RobotTask(go=FAR))
+    rig.operator.robot.order(RobotTask(go=THERE), RobotTask(go=FAR))
     (told,) = rig.operator.advance(now=rig.now)
-    rig.operator.stop()
+    rig.operator.robot.stop(now=rig.now)
     (stopped,) = rig.operator.advance(now=rig.now)
     assert [(errand.number, errand.task.go) for errand in told.errands] == [(1, THERE), (2, FAR)]
     assert [(errand.number, errand.task) for errand in stopped.errands] == [(3, HALT)]
@@ -144,21 +144,21 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
     rig = Rig()
     rig.begin()
     jobs = JobList((MessageJob(1, "Look"), job, MoveJob(3, FAR)))
-    rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
     rig.run(2.0)
-    assert rig.operator.doing is Doing.JOBS
+    assert rig.operator.robot.doing is Doing.JOBS
     if stop in {"abort", "pause"}:
-        rig.operator.order(RobotTask(do=ListCommand(stop)))
+        rig.operator.robot.order(RobotTask(do=ListCommand(stop)))
     elif stop == "stop":
-        rig.operator.stop()
+        rig.operator.robot.stop(now=rig.now)
     elif stop == "wheel":
-        rig.operator.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
+        rig.operator.robot.wish(0.2, 0.0, issued_at=rig.now, now=rig.now)
     else:
         rig.host.halt("the robot touches something: chair", now=rig.now + rig.AHEAD)
     rig.run(1.5)
     assert stands(rig)
     assert within_limits(rig)
-    tasks = rig.operator.tasks
+    tasks = rig.operator.robot.tasks
     assert tasks is not None
     assert tasks.progress.stage is (JobStage.ABORTED if stop == "abort" else JobStage.PAUSED)
     assert rig.autonomy.runner.jobs == jobs
@@ -167,19 +167,19 @@ def test_stopping_in_the_middle_of_a_job_leaves_the_robot_standing_and_the_list_
     # And it goes on under a new drive.
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    assert rig.operator.order(RobotTask(do=ListCommand.RESUME)) == ""
+    assert rig.operator.robot.order(RobotTask(do=ListCommand.RESUME)) == ""
     rig.run(1.0)
-    assert rig.operator.doing is Doing.JOBS
+    assert rig.operator.robot.doing is Doing.JOBS
 
 
 def test_a_job_without_an_arm_fails_and_says_so() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(
+    rig.operator.robot.order(
         RobotTask(jobs=JobList((ArmJob(1, "pick"), MoveJob(2, THERE)))), RobotTask(do=ListCommand.RUN)
     )
     rig.run(1.0)
-    tasks = rig.operator.tasks
+    tasks = rig.operator.robot.tasks
     assert tasks is not None
     assert (tasks.progress.stage, tasks.progress.jobs[0].stage) == (JobStage.FAILED, JobStage.FAILED)
     assert "no arm" in tasks.progress.reason
@@ -194,7 +194,7 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
     rig.begin()
     listed = JobList((MoveJob(1, THERE), WaitJob(2), VoiceJob(3, "Hi")))
     list_and_run = RobotTask(jobs=listed), RobotTask(do=ListCommand.RUN)
-    rig.operator.order(*(list_and_run if jobs else (RobotTask(go=THERE),)))
+    rig.operator.robot.order(*(list_and_run if jobs else (RobotTask(go=THERE),)))
     rig.run(2.0)
     rig.line.connected = False
     rig.run(4.0)
@@ -206,8 +206,8 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
         rig.run(2.0)
         assert stands(rig)
         if jobs:
-            assert rig.operator.tasks is not None
-            assert rig.operator.tasks.progress.stage is JobStage.PAUSED
+            assert rig.operator.robot.tasks is not None
+            assert rig.operator.robot.tasks.progress.stage is JobStage.PAUSED
     else:
         rig.run(20.0)
         assert math.dist(rig.truth[:2], (THERE.x, THERE.y)) < 0.05
@@ -215,27 +215,27 @@ def test_losing_the_operator_follows_the_policy(hold: bool, loss: OperatorLoss, 
         rig.run(2.0)
         if jobs:
             # It's heard again, and may end its waiting.
-            assert rig.operator.doing is Doing.JOBS
-            assert rig.operator.order(RobotTask(do=ListCommand.KEY)) == ""
+            assert rig.operator.robot.doing is Doing.JOBS
+            assert rig.operator.robot.order(RobotTask(do=ListCommand.KEY)) == ""
             rig.run(3.0)
-            assert rig.operator.tasks is not None
-            assert rig.operator.tasks.progress.stage is JobStage.DONE
+            assert rig.operator.robot.tasks is not None
+            assert rig.operator.robot.tasks.progress.stage is JobStage.DONE
         assert rig.autonomy.doing is Doing.NOTHING
     # Nothing moves any more before somebody says so.
     rig.run(1.0)
     assert stands(rig)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
-    assert rig.operator.order(RobotTask(go=FAR)) == ""
+    assert rig.operator.robot.order(RobotTask(go=FAR)) == ""
     rig.run(2.0)
-    assert rig.operator.doing is Doing.GOAL
+    assert rig.operator.robot.doing is Doing.GOAL
 
 
 def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back() -> None:
     rig = Rig()
     rig.begin()
     rig.line.connected = False
-    rig.operator.order(RobotTask(go=THERE))
+    rig.operator.robot.order(RobotTask(go=THERE))
     rig.run(3.0)
     rig.line.connected = True
     rig.run(3.0)
@@ -249,45 +249,45 @@ def test_what_was_told_just_before_the_link_broke_doesnt_begin_when_it_is_back()
 def test_what_is_given_while_the_robot_comes_to_rest_begins_then_unless_that_takes_long() -> None:
     rig = Rig()
     rig.begin()
-    rig.operator.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
     rig.run(4.0)
-    rig.operator.order(RobotTask(do=ListCommand.PAUSE))
+    rig.operator.robot.order(RobotTask(do=ListCommand.PAUSE))
     while rig.operator.cause is not HaltCause.STOPPED:
         rig.run(0.05)
-    assert rig.operator.order(RobotTask(do=ListCommand.RESUME)) == ""
-    assert rig.operator.doing is Doing.NOTHING
+    assert rig.operator.robot.order(RobotTask(do=ListCommand.RESUME)) == ""
+    assert rig.operator.robot.doing is Doing.NOTHING
     rig.run(2.0)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
-    assert rig.operator.doing is Doing.JOBS
-    rig.operator.stop()
-    rig.operator.order(RobotTask(go=FAR))
+    assert rig.operator.robot.doing is Doing.JOBS
+    rig.operator.robot.stop(now=rig.now)
+    rig.operator.robot.order(RobotTask(go=FAR))
     rig.run(6.0)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
-    assert rig.operator.doing is Doing.NOTHING
+    assert rig.operator.robot.doing is Doing.NOTHING
     # A stop forgets it.
-    rig.operator.stop()
-    rig.operator.order(RobotTask(go=FAR))
-    rig.operator.stop()
+    rig.operator.robot.stop(now=rig.now)
+    rig.operator.robot.order(RobotTask(go=FAR))
+    rig.operator.robot.stop(now=rig.now)
     rig.run(1.0)
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(1.0)
-    assert rig.operator.doing is Doing.NOTHING
+    assert rig.operator.robot.doing is Doing.NOTHING
 
 
 def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(RobotTask(jobs=JobList((WaitJob(1), MoveJob(2, FAR)))), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=JobList((WaitJob(1), MoveJob(2, FAR)))), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     rig.line.change(LinkConditions.symmetric(Conditions(delay=delay_profile("constant:1.0"))), now=rig.now)
     rig.run(4.0)
     assert rig.autonomy.doing is Doing.JOBS
-    rig.operator.order(RobotTask(do=ListCommand.KEY))
+    rig.operator.robot.order(RobotTask(do=ListCommand.KEY))
     rig.run(3.0)
     assert rig.autonomy.report().progress.jobs[0].stage is JobStage.RUNNING, "too old to move anything"
-    rig.operator.order(RobotTask(do=ListCommand.ABORT))
+    rig.operator.robot.order(RobotTask(do=ListCommand.ABORT))
     rig.run(3.0)
     assert rig.autonomy.report().progress.stage is JobStage.ABORTED
     assert stands(rig)
@@ -296,7 +296,7 @@ def test_what_stops_counts_however_old_it_is_and_nothing_else_does() -> None:
 def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> None:
     rig = Rig(hold=True)
     rig.begin()
-    rig.operator.order(RobotTask(jobs=JobList((WaitJob(1),))), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=JobList((WaitJob(1),))), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     robot, (x, y, theta) = rig.robot, rig.truth
     epoch = robot.epoch
@@ -309,7 +309,7 @@ def test_no_drive_begins_while_a_list_is_being_done_though_the_robot_rests() -> 
 def test_another_operator_finds_the_list_paused() -> None:
     rig = Rig(jobs=RunnerConfig(loss=OperatorLoss.CARRY_ON))
     rig.begin()
-    rig.operator.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(jobs=JobList((MoveJob(1, THERE),))), RobotTask(do=ListCommand.RUN))
     rig.run(2.0)
     rig.line.connected = False
     rig.run(2.5)

@@ -11,9 +11,9 @@ from interfaces.jobs import JobFile
 from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from interfaces.messages.mobile import Plan, Tasks
-from interfaces.runtime.live.mobile_drawing import ROUTE_SPEED, route_timeline
-from interfaces.runtime.live.mobile_tasks import TOO_LONG, TaskDesk
-from interfaces.stream.session import News
+from interfaces.runtime.live.base_twins import ROUTE_SPEED, route_timeline
+from interfaces.runtime.live.task_desk import TOO_LONG, TaskDesk
+from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
 from robots.onboard.journey import Goal
@@ -35,7 +35,7 @@ class Office:
         self.desk = TaskDesk(self.rig.operator, ROOM, MODEL, self.told.append, file)
 
     def run(self, seconds: float) -> None:
-        self.rig.run(seconds, lambda _: self.desk.turn())
+        self.rig.run(seconds, lambda now: self.desk.turn(now=now))
 
     def order(self, task: RobotTask) -> str:
         return self.desk.order(task)

@@ -6,9 +6,10 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from msgspec.structs import replace
+from typing_extensions import override
 
 from interfaces.jobs import JobFile, JobRunner, carried_over, digest, dry_run, written_jobs
 from interfaces.jobs.runner import EMPTY, RUNS
@@ -20,12 +21,15 @@ from interfaces.messages.jobs import (
     Forecast,
     JobList,
     ListCommand,
+    OperatorLoss,
     Progress,
 )
 from interfaces.messages.mobile import Plan, Seen, Tasks
-from interfaces.stream.session import News
-from interfaces.teleop.driving import DrivingOperator
+from interfaces.runtime.live.devices import OperatorDevice
+from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
 from robots.bullet.rooms import Room
 from robots.ipr.navigation import outline_of, route_map
@@ -44,12 +48,14 @@ _LEFT: Final = 0.05
 _log = logging.getLogger(__name__)
 
 
-class TaskDesk:
+class TaskDesk(OperatorDevice):
     """Takes what clients want of a robot, keeps the list, and tells everybody how it is."""
+
+    name = "jobs"
 
     def __init__(
         self,
-        operator: DrivingOperator,
+        operator: OperatorSite[VirtualBase],
         room: Room,
         base: MobileBase,
         tell: Callable[[News], None],
@@ -85,7 +91,7 @@ class TaskDesk:
         self._sight: SensedPoints | None = None
         self._told = Tasks()
         self._tell(self.plan())
-        self.turn()
+        self._tell_tasks()
 
     def _loaded(self) -> tuple[JobList, Progress]:
         if self._file is None:
@@ -110,7 +116,7 @@ class TaskDesk:
             return self._edit(task.jobs)
         if task.do is ListCommand.DRY_RUN:
             return self._try()
-        return self._operator.order(task) if task.do is None else self._command(task, task.do)
+        return self._operator.robot.order(task) if task.do is None else self._command(task, task.do)
 
     def _edit(self, jobs: JobList) -> str:
         """Take another list, and keep it."""
@@ -121,7 +127,7 @@ class TaskDesk:
             return TOO_LONG
         self.jobs, self.progress, self._digest, self._forecast = jobs, progress, digest(jobs), None
         self._keep()
-        self.turn()
+        self._tell_tasks()
         return ""
 
     def _command(self, task: RobotTask, command: ListCommand) -> str:
@@ -131,8 +137,8 @@ class TaskDesk:
             return refusal
         has = self._report is not None and self._report.digest == self._digest
         if has:
-            return self._operator.order(task)
-        return self._operator.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
+            return self._operator.robot.order(task)
+        return self._operator.robot.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
 
     def _try(self) -> str:
         """Begin a dry run of the list, from where the robot is."""
@@ -152,7 +158,7 @@ class TaskDesk:
         forecast = await asyncio.to_thread(self._forecast_of, jobs, report.posture)
         if jobs == self.jobs:
             self._forecast = forecast
-            self.turn()
+            self._tell_tasks()
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
         if self._roads is None:
@@ -161,11 +167,15 @@ class TaskDesk:
 
     @property
     def _doing(self) -> Doing:
-        return self._operator.doing
+        return self._operator.robot.doing
 
-    def turn(self) -> None:
+    @override
+    def turn(self, *, now: float) -> None:
+        self._tell_tasks()
+
+    def _tell_tasks(self) -> None:
         """Take in what the robot has said, and tell everybody what is new."""
-        report, sight = self._operator.tasks, self._operator.sight
+        report, sight = self._operator.robot.tasks, self._operator.robot.sight
         if report is not None and report is not self._report:
             self._report = report
             if report.digest == self._digest and self.jobs.jobs and report.progress != self.progress:
@@ -190,6 +200,16 @@ class TaskDesk:
         way = report.journey, report.reason, report.goal, report.route, left
         listed = self.jobs, self.progress, self._forecast
         return Tasks(self._doing, *way, *listed, loss, report.shows, report.says, self.problem, answers)
+
+    @property
+    @override
+    def carries_on(self) -> bool:
+        tasks = self._operator.robot.tasks
+        return self._doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
+
+    @override
+    def health(self) -> dict[str, Any]:
+        return {"stage": self.progress.stage, "problem": self.problem}
 
     def _keep(self) -> None:
         """Save the list."""
