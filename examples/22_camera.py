@@ -10,7 +10,7 @@ from PIL import Image
 
 from robots import load
 from robots.bullet.rooms import read_room
-from robots.ipr.camera import PanTilt, Sight
+from robots.mobile.camera import PanTilt, Sight
 from robots.robot import HeadCamera
 
 room = read_room("""room 1

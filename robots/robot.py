@@ -196,7 +196,7 @@ class Robot:
     """None draws a base as a box, an arm as its frames and traces."""
     bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
-    `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
+    `robots.mobile.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
     devices: tuple[object, ...] = ()
     """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
     found_by: str = ""

@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.system import module_process
 from robots.bullet.rooms import Room
-from robots.ipr.camera import Lens, PanTilt, PanTiltConfig
+from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
 from robots.robot import USUAL_BASE
 from vrs.checks import number_in
 from vrs.clock import Clock

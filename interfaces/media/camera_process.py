@@ -12,7 +12,7 @@ import sys
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
 from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
-from robots.ipr.camera import Look, Sight
+from robots.mobile.camera import Look, Sight
 from robots.robot import HeadCamera, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError

@@ -7,7 +7,7 @@ from typing import Final, TypeAlias, TypeVar
 import msgspec
 
 from robots.bullet.rooms import Room
-from robots.ipr.camera import Lens
+from robots.mobile.camera import Lens
 from vrs.errors import FormatError
 
 MESSAGE_MOST: Final = 1 << 24

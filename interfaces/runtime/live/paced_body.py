@@ -32,8 +32,8 @@ from interfaces.teleop.driving import (
     NavigatorPilot,
 )
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Senses
-from robots.ipr.robot import MobileRobot
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import MobileRobot
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.following import SoundPosition

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.ipr.camera import Lens, Look, PanTilt, PanTiltConfig, lens_pose
-from robots.ipr.chassis import IPR
+from robots.ipr.parameters import IPR
 from robots.ipr.shapes import SCREEN_SIZE, headless, ipr_shapes, screen_pose
+from robots.mobile.camera import Lens, Look, PanTilt, PanTiltConfig, lens_pose
 from robots.robot import HeadCamera, load
 from vrs.errors import InvalidValueError
 from vrs.model import Array

@@ -12,7 +12,7 @@ import pytest
 from robots.base import upright
 from robots.bullet.rooms import EMPTY, read_room
 from robots.bullet.world import SKY, Picture
-from robots.ipr.camera import Lens, Look, Sight, lens_pose
+from robots.mobile.camera import Lens, Look, Sight, lens_pose
 from robots.robot import HeadCamera, load
 
 CAMERA = load("ipr").device(HeadCamera)
