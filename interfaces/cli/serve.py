@@ -368,7 +368,7 @@ def _operator(serving: _Serving, access: Access) -> LiveOperator:
         serving.robot, "", serving.conditions, serving.robot_token, serving.seed, software(), serving.link_loss,
         recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
-        camera=CameraConfig(serving.camera) if serving.camera else None,
+        camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
     )  # fmt: skip
     return LiveOperator(config, access)
 

@@ -32,7 +32,7 @@ from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
 from robots.bullet.rooms import Room
-from robots.ipr.navigation import outline_of, route_map
+from robots.mobile.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteMap
