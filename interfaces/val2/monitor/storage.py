@@ -156,7 +156,7 @@ def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None,
         state.controller.cell = source.signals
     counts = [(len(source.programs), "program"), (len(entries), "value"), (len(source.signals), "signal rule")]
     said = [_counted(*count) for count in counts if count[0]]
-    state.say(f"{name}: {', '.join(said) or 'nothing'}")
+    state.say(f"{name}: {', '.join(said) or 'nothing'}", *map(str, source.undefined))
 
 
 def _set_all(memory: Memory, entries: Sequence[NamedValue]) -> Generator[int, None, None]:

@@ -167,6 +167,21 @@ def test_a_file_that_is_too_long_is_refused(sitting, tmp_path):
     assert sitting.type("LOAD big") == "*File error* big.v2: longer than 4000000 bytes\n"
 
 
+def test_a_file_with_unknown_instructions_is_loaded_and_all_of_them_are_named(sitting, tmp_path):
+    text = ".PROGRAM odd\n TYPE 1\n IF FALSE THEN\n FROBNICATE 3, x ;why\n END\n MVOE p\n.END\n"
+    (tmp_path / "odd.v2").write_text(text)
+    said = sitting.type("LOAD odd").splitlines()
+    assert said[0] == "odd.v2: 1 program"
+    assert said[1:] == [
+        "*Undefined instruction* FROBNICATE, program odd, step 3, column 2",
+        "*Undefined instruction* MVOE; did you mean MOVE?, program odd, step 5, column 2",
+    ]
+    assert "    FROBNICATE 3, x ;why\n" in sitting.type("LISTP odd")
+    said = sitting.type("EXECUTE odd")
+    assert "*Undefined instruction* MVOE; did you mean MOVE?, program odd, step 5" in said
+    assert "FROBNICATE" not in said
+
+
 def test_files_are_deleted_and_renamed_and_asked_for_first(sitting, tmp_path):
     sitting.type(*HELLO, "STORE a", "STORE b")
     sitting.line("FDELETE a")
