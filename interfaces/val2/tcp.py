@@ -11,8 +11,8 @@ import contextlib
 import math
 import re
 import socket
-from collections.abc import AsyncIterator, Callable
-from functools import partial
+from collections import deque
+from collections.abc import AsyncIterator, Iterable
 from typing import Final
 
 from typing_extensions import override
@@ -20,7 +20,7 @@ from typing_extensions import override
 from interfaces.stream.access import Access
 from interfaces.stream.limits import Strangers
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
-from interfaces.val2.monitor.teletype import LineTerminal
+from interfaces.val2.monitor.teletype import Input, LineTerminal
 from interfaces.val2.rooms import TerminalRoom
 
 MOST: Final = 16
@@ -56,24 +56,18 @@ _FOREIGN_LINE: Final = re.compile(rf"{_OTHER_PROTOCOL.pattern}|[!#$%&'*+.^_`|~0-
 
 
 class TcpTerminal(LineTerminal):
-    """The terminal of a connection, once it has shown a token."""
+    """The terminal of a connection that has shown a token."""
 
-    def __init__(
-        self,
-        writer: asyncio.StreamWriter,
-        terminal: Callable[[str], TerminalMonitor | None],
-        full: Callable[[], bool],
-    ) -> None:
-        """Ask for a token.
+    def __init__(self, writer: asyncio.StreamWriter, monitor: TerminalMonitor, source: Input) -> None:
+        """Begin.
 
         Args:
             writer: Where to.
-            terminal: Makes the monitor for a token; None for a wrong one.
-            full: Whether there are as many terminals as there may be.
+            monitor: Whose terminal it is.
+            source: Makes lines of what comes.
         """
-        super().__init__(self._write, newline=_NEWLINE, at_once=SLICE)
-        self.writer, self._terminal, self._full = writer, terminal, full
-        self._tries, self._characters = TOKEN_TRIES, 0
+        super().__init__(self._write, monitor, source, newline=_NEWLINE, at_once=SLICE)
+        self.writer = writer
         self.lost = False
         """Whether output was lost since anything was sent."""
         self._probed_at = math.inf
@@ -83,7 +77,6 @@ class TcpTerminal(LineTerminal):
         self.may_read = asyncio.Event()
         """Set while more may be read."""
         self.may_read.set()
-        self.send(_TOKEN)
 
     @property
     def unread(self) -> int:
@@ -91,8 +84,8 @@ class TcpTerminal(LineTerminal):
         return self.writer.transport.get_write_buffer_size()
 
     @override
-    def feed(self, data: bytes) -> None:
-        super().feed(data)
+    def take(self, lines: Iterable[str], *, ended: bool = False) -> None:
+        super().take(lines, ended=ended)
         if len(self.lines) > MOST_QUEUED:
             self.may_read.clear()
 
@@ -100,7 +93,7 @@ class TcpTerminal(LineTerminal):
     def advance(self, *, now: float) -> None:
         if self.writer.transport.is_closing():
             self.leave(now=now)
-        if self.monitor is None or self.over.is_set():
+        if self.over.is_set():
             return
         super().advance(now=now)
         if len(self.lines) <= MOST_QUEUED:
@@ -113,32 +106,6 @@ class TcpTerminal(LineTerminal):
         if self.monitor.done:
             self.over.set()
 
-    def unlock(self, data: bytes, *, now: float) -> bool:
-        """Take bytes, none at the end of the input, until a token makes the monitor; whether one has."""
-        self.feed(data)
-        while self.lines and not self.over.is_set():
-            text = self.lines.popleft().strip()
-            self._characters += len(text) + 1
-            monitor = self._terminal(text) if text else None
-            if monitor is not None and self._full():
-                self.send(f"*Too many terminals* {MOST} at most{_NEWLINE}")
-                self.over.set()
-            elif monitor is not None:
-                self.monitor = monitor
-                monitor.start(now=now)
-                return True
-            elif text == OVERLONG or self._characters > TOKEN_CHARACTERS or _FOREIGN_LINE.match(text):
-                self.over.set()
-            elif text:
-                self._tries -= 1
-                self.send(f"*Invalid token*{_NEWLINE}{_TOKEN if self._tries else ''}")
-                if not self._tries:
-                    self.over.set()
-        begun = self._input.begun.lstrip()
-        if self.ended or len(begun) > TOKEN_CHARACTERS or _OTHER_PROTOCOL.match(begun):
-            self.over.set()
-        return False
-
     def _write(self, text: str) -> None:
         data = text.encode()
         if self.unread + len(data) > UNREAD:
@@ -150,13 +117,12 @@ class TcpTerminal(LineTerminal):
 
     def leave(self, *, now: float) -> None:
         """The connection is gone: what it ran is stopped."""
-        if self.monitor is not None:
-            self.monitor.leave(now=now)
+        self.monitor.leave(now=now)
         self.over.set()
 
     def next_deadline(self) -> float:
         """When something is due [s]."""
-        if self.monitor is None or self.over.is_set():
+        if self.over.is_set():
             return math.inf
         return -math.inf if self.lines else min(self.monitor.next_deadline(), self._probed_at + PROBE_PERIOD)
 
@@ -210,9 +176,8 @@ class TcpTerminalServer:
                         await asyncio.sleep(0.01)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        monitor = partial(self._room.monitor, self._access)
-        connection = TcpTerminal(writer, monitor, lambda: len(self._connections) >= MOST)
-        if await self._let_in(connection, reader):
+        connection = await self._let_in(reader, writer)
+        if connection is not None:
             self._connections.add(connection)
             self._room.join(connection)
             reading = asyncio.create_task(self._read(connection, reader))
@@ -230,25 +195,51 @@ class TcpTerminalServer:
             except TimeoutError:
                 writer.transport.abort()
 
-    async def _let_in(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> bool:
-        """Wait for a token; whether one was accepted. Another stranger may be cut off for this one."""
-        writer = connection.writer
+    async def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> TcpTerminal | None:
+        """Wait for a token; the terminal of who shows one. Another stranger may be cut off for this one."""
         address = str(writer.get_extra_info("peername", ("",))[0])
         oldest = self._unauthenticated.add(writer, address, until=math.inf)
         if oldest is not None:
             oldest.transport.abort()
         try:
             async with asyncio.timeout(TOKEN_TIMEOUT):
-                while not connection.over.is_set():
-                    data = await reader.read(_READ)
-                    if connection.unlock(data, now=self._room.clock.now()):
-                        return True
-                    await asyncio.sleep(0)
+                return await self._with_token(reader, writer)
         except (OSError, TimeoutError):
-            pass
+            return None
         finally:
             self._unauthenticated.discard(writer)
-        return False
+
+    async def _with_token(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> TcpTerminal | None:
+        """Ask for a token until there's a right one, or who shows none is to be hung up on."""
+        source, tries, characters, data = Input(), TOKEN_TRIES, 0, _NUL
+        writer.write(_TOKEN.encode())
+        while data:
+            data = await reader.read(_READ)
+            lines = deque(source.feed(data) if data else source.end())
+            while lines:
+                text = lines.popleft().strip()
+                characters += len(text) + 1
+                monitor = self._room.monitor(self._access, text) if text else None
+                if monitor is not None and len(self._connections) >= MOST:
+                    writer.write(f"*Too many terminals* {MOST} at most{_NEWLINE}".encode())
+                    return None
+                if monitor is not None:
+                    terminal = TcpTerminal(writer, monitor, source)
+                    terminal.take(lines, ended=not data)
+                    monitor.start(now=self._room.clock.now())
+                    return terminal
+                if text == OVERLONG or characters > TOKEN_CHARACTERS or _FOREIGN_LINE.match(text):
+                    return None
+                if text:
+                    tries -= 1
+                    writer.write(f"*Invalid token*{_NEWLINE}{_TOKEN if tries else ''}".encode())
+                    if not tries:
+                        return None
+            begun = source.begun.lstrip()
+            if len(begun) > TOKEN_CHARACTERS or _OTHER_PROTOCOL.match(begun):
+                return None
+            await asyncio.sleep(0)
+        return None
 
     async def _read(self, connection: TcpTerminal, reader: asyncio.StreamReader) -> None:
         data = _NUL

@@ -137,7 +137,8 @@ class LineTerminal:
     def __init__(
         self,
         send: Callable[[str], object],
-        monitor: TerminalMonitor | None = None,
+        monitor: TerminalMonitor,
+        source: Input,
         *,
         newline: str = "\n",
         piped: bool = False,
@@ -147,27 +148,31 @@ class LineTerminal:
 
         Args:
             send: Sends a text.
-            monitor: Whose terminal it is; None for one that comes later.
+            monitor: Whose terminal it is.
+            source: Makes lines of what comes.
             newline: What ends lines.
-            piped: Whether lines wait until the monitor takes them, and are echoed; else it's telnet.
+            piped: Whether lines wait until the monitor takes them, and are echoed.
             at_once: How many lines are taken in one turn.
         """
         self.send, self.monitor = send, monitor
         self._newline, self._piped, self._at_once = newline, piped, at_once
-        self._input, self._output = Input(telnet=not piped), Output(newline)
+        self._input, self._output = source, Output(newline)
         self.lines: deque[str] = deque()
         """Lines that wait to be taken."""
         self.ended = self.end_announced = False
 
     def feed(self, data: bytes) -> None:
         """Take bytes; none at the end of the input."""
-        self.lines.extend(self._input.feed(data) if data else self._input.end())
-        self.ended |= not data
+        self.take(self._input.feed(data) if data else self._input.end(), ended=not data)
+
+    def take(self, lines: Iterable[str], *, ended: bool = False) -> None:
+        """Take lines, and whether they are the last."""
+        self.lines.extend(lines)
+        self.ended |= ended
 
     def advance(self, *, now: float) -> None:
         """Do what is due, and what was typed."""
         monitor = self.monitor
-        assert monitor is not None
         monitor.advance(now=now)
         self.give()
         for _ in range(min(self._at_once, len(self.lines))):
@@ -190,8 +195,7 @@ class LineTerminal:
 
     def give(self) -> None:
         """Send what was said, and the prompt."""
-        if self.monitor is not None:
-            self.send(self._output.give(self.monitor.output(), self.monitor.prompt))
+        self.send(self._output.give(self.monitor.output(), self.monitor.prompt))
 
 
 _READ: Final = 65_536
@@ -212,7 +216,7 @@ class Pipe:
             source: File descriptor.
         """
         self._monitor, self._clock, self._source = monitor, clock, source
-        self._terminal = LineTerminal(sys.stdout.write, monitor, piped=True)
+        self._terminal = LineTerminal(sys.stdout.write, monitor, Input(telnet=False), piped=True)
         self._room = threading.Event()
         self._done = asyncio.Event()
         self._turning = Turning(clock, self._turn)
