@@ -66,7 +66,7 @@ class RobotPort(Protocol):
         """
 
     def outcome(self, number: int, *, now: float) -> Issued | None:
-        """What became of it by now, as later commands left it; None while nothing was heard, or it's forgotten."""
+        """What became of it by now, as later commands left it; None while nothing was heard."""
 
 
 Execute: TypeAlias = Callable[[Command | None, float], Receipt | Refusal | None]
