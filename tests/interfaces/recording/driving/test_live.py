@@ -22,7 +22,7 @@ from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUA
 from robots.bullet.rooms import Room
 from robots.ipr.robot import place
 from robots.onboard.journey import Goal
-from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
+from tests.interfaces.teleop.rig import CONTROL, TURN, Rig
 from vrs.comparison import match_paths, summed_up
 
 BEFORE = 4.0
