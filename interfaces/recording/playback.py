@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
-from interfaces.recording.figures import Follower, Pursuit
+from interfaces.recording.figures import Pursuit
 from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader
 from interfaces.recording.recording import Recording, check_alike
@@ -84,19 +83,18 @@ class PlaybackMoment:
     """One for each recording."""
 
 
-class _AtEqualTime(Follower):
-    """Compares with the virtual robot at equal timeline time."""
+class _AtEqualTime:
+    """How a real robot follows a virtual one: compared at equal timeline time."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
 
-    @override
-    def play(self, t: float) -> float | None:
+    def play(self, t: float) -> float:
+        """The time of the timeline at which the real robot is at a time [s]."""
         return float(self._recording.play(t))
 
-    @override
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """See `Follower`: the largest difference of a joint that turns [rad]; where none does, of any [m]."""
+    def error(self, _t: float, q_real: Array, play: float) -> float | None:
+        """The largest difference of a joint that turns [rad]; where none does, of any [m]."""
         q, prismatic = self._recording.virtual(play), self._recording.prismatic
         some = slice(None) if len(prismatic) in (0, len(q)) else [j for j in range(len(q)) if j not in prismatic]
         return float(np.abs(q_real - q)[some].max()) if np.isfinite(q).all() else None
@@ -109,7 +107,7 @@ class PlaybackTrack:
         self.recording, self.marks = recording, MarkReader(recording)
         self.shift = shift
         """The play-back's time less the recording's own [s]."""
-        self._follower: Follower = _AtEqualTime(recording) if recording.kind is ARM else Pursuit(recording)
+        self._follower = _AtEqualTime(recording) if recording.kind is ARM else Pursuit(recording)
         self.problem = ""
         """What of the file makes no sense, the first line of it; empty where all does."""
         self._more = True

@@ -292,14 +292,14 @@ class Recording:
         return edits
 
     @property
-    def drives(self) -> tuple[AnyTimeline, ...]:
-        """The newest timeline of each drive, by their starts; of an arm there's one.
+    def drives(self) -> Sequence[AnyTimeline]:
+        """The newest timeline of each drive, by their starts; of an arm there's one. Not to be changed.
 
         Raises:
             FormatError: If none is known.
         """
         self._known()
-        return tuple(self._chain.drives)
+        return self._chain.drives
 
     def timeline_at(self, t: float) -> AnyTimeline:
         """The timeline as it was known at a user time [s]: what came later isn't in it.
