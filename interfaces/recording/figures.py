@@ -36,7 +36,7 @@ from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
 from interfaces.runs.twin_run import ADAPTIVE, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
 from interfaces.teleop.architectures import Transport
-from robots.ipr.robot import Collision
+from robots.mobile.robot import Collision
 from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import PathMatch, match_paths, measured_rows, resample
 from vrs.errors import FormatError, InvalidValueError

@@ -45,7 +45,7 @@ from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
-from robots.ipr.robot import MobileRobot
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE
 from vrs.commands import Lateness

@@ -13,8 +13,8 @@ from interfaces.messages.recording import Direction
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import MobileReality
-from robots.ipr.robot import PLACES, Collision, MobileRobot
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE, USUAL_BASE, Robot, load
 from vrs.checks import one_of, validated, within

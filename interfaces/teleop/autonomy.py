@@ -28,9 +28,9 @@ from interfaces.jobs.runner import (
 from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
 from interfaces.messages.fields import MOST_POINTS
 from interfaces.messages.jobs import ArmJob, ListCommand, MoveJob, OperatorLoss, VoiceJob
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import MobileRobot
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from robots.onboard.following import PositionSource
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState
