@@ -191,14 +191,10 @@ class Playback:
         self.growing = False
         """Whether a file is being written."""
         self._grown = self._due = -math.inf
-        self._span = self._spanned()
-        self.head = PlayHead(self._live, lambda: self._span)
-        self.head.pause(now=0.0)
-
-    @property
-    def span(self) -> tuple[float, float]:
+        self.span = self._spanned()
         """From when to when there's something [s]."""
-        return self._span
+        self.head = PlayHead(self._live, lambda: self.span)
+        self.head.pause(now=0.0)
 
     @property
     def mode(self) -> Mode:
@@ -213,7 +209,7 @@ class Playback:
     def place(self, *, now: float) -> float:
         """The time that is shown [s]."""
         place = self.head.position(now)
-        start, end = self._span
+        start, end = self.span
         return start if place is None else min(max(place, start), end)
 
     def play(self, *, now: float, rate: float | None = None) -> None:
@@ -227,7 +223,7 @@ class Playback:
             InvalidValueError: If rate is out of range, or 0.
         """
         rate = checked_rate(self.head.rate if rate is None else rate)
-        place, (start, end) = self.place(now=now), self._span
+        place, (start, end) = self.place(now=now), self.span
         if rate > 0 and place >= end and not self.growing:
             self.head.seek(start, now=now)
         elif rate < 0 and place <= start:
@@ -253,7 +249,7 @@ class Playback:
 
     def seek(self, t: float, *, now: float) -> None:
         """Go to a time [s], the nearest there is; what stood stands there, all else plays on."""
-        start, end = self._span
+        start, end = self.span
         self.head.seek(min(max(finite("t", t, "finite seconds"), start), end), now=now)
 
     def seek_mark(self, *, back: bool, now: float) -> Mark | None:
@@ -308,7 +304,7 @@ class Playback:
             track.look()
 
     def _at_an_end(self, place: float) -> bool:
-        (start, end), loop, rate = self._span, self.head.loop, self.head.rate
+        (start, end), loop, rate = self.span, self.head.loop, self.head.rate
         if rate > 0:
             return place >= end and not self.growing and (loop is None or loop[1] < end)
         return place <= start and (loop is None or loop[0] > start)
@@ -329,8 +325,8 @@ class Playback:
         grown = [track.poll() for track in self.tracks]
         if any(grown):
             shown = self.place(now=now)
-            self._span = self._spanned()
-            newest = self._span[1] - LAG
+            self.span = self._spanned()
+            newest = self.span[1] - LAG
             if not self.growing:
                 # What was shown of it already isn't taken back.
                 self._edge, newest = LiveEdge(), max(newest, shown)
