@@ -103,7 +103,9 @@ class LiveOperator(LeasedRobot, Workers):
         if which.is_base:
             twins = BaseTwins(which, config.conditions, config.seed, config.room)
         else:
-            twins = ArmTwins(which, config.conditions, config.seed, config.q, config.site)
+            twins = ArmTwins(
+                which, config.conditions, config.seed, q=config.q, config=config.site, rates=config.rates
+            )
         self.clock = WallClock()
         self.twins, self.operator, self.line, self.scene = twins, twins.operator, twins.line, twins.scene
         self._turning = Turning(self.clock, self._turn)
@@ -113,8 +115,7 @@ class LiveOperator(LeasedRobot, Workers):
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
-        rates = () if which.is_base else config.rates
-        hub = HubConfig(rates=rates, server=config.server, instance=secrets.token_urlsafe(9))
+        hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         workers = self if which.is_base else None
         self.hub = Hub(twins.site, lease, access, self, config=hub, emulation=self.emulation, workers=workers)
