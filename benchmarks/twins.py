@@ -10,7 +10,7 @@ from benchmarks.moves import LIMITS, MODEL
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, VirtualArm
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.commands import Command
 
@@ -52,7 +52,7 @@ def part() -> Part:
 def session(profile: str, length: float) -> tuple[Laboratory, int, int]:
     """Both sites with what the operator will do; how many moves and steering inputs."""
     rng = np.random.default_rng(0)
-    operator, robot = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), RobotSite(MODEL, NOMINAL, now=0.0)
+    operator, robot = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), FollowingArm(MODEL, NOMINAL, now=0.0)
     conditions = Conditions(delay=delay_profile(profile), service=Service.IN_ORDER)
     lab = Laboratory(operator, robot, LinkConditions.symmetric(conditions), rng)
 

@@ -6,14 +6,14 @@ import numpy as np
 
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, VirtualArm
 from robots import puma560
 from vrs import JointTarget, MotionCommand
 
 model = puma560.model()
 home = model.poses["nominal"]
 operator = OperatorSite(VirtualArm(model, home, now=0.0))
-robot = RobotSite(model, home, now=0.0)
+robot = FollowingArm(model, home, now=0.0)
 conditions = Conditions(delay=delay_profile("mon@0.2"), loss=BernoulliLoss(0.2))
 lab = Laboratory(operator, robot, LinkConditions.symmetric(conditions), np.random.default_rng(1))
 

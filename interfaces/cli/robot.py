@@ -245,7 +245,8 @@ def robot(
         from interfaces.messages.jobs import POLICY_SAYS, OperatorLoss
         from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
         from interfaces.teleop.architectures.compositions import CONTROL
-        from interfaces.teleop.driving import DrivenConfig, Hands
+        from interfaces.teleop.autonomy import Hands
+        from interfaces.teleop.following_base import DrivenConfig
         from interfaces.val2.val_arm import ValArm, in_a_thread
 
         driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=watchdog)

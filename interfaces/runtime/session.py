@@ -35,7 +35,7 @@ from interfaces.runs.twin_run import (
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.system import software
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots.robot import ArmBody, Robot, exact_arm
 from vrs import Lateness, Receipt, Status
 from vrs.model import Array
@@ -94,7 +94,7 @@ class TwinSession:
         self._start, self._robot, self._offset, self._body = start, robot, offset, body
         self.operator = OperatorSite(VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE))
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
-        self._site = RobotSite(model, start, now=0.0, config=config)
+        self._site = FollowingArm(model, start, now=0.0, config=config)
         self.lab = Laboratory(
             self.operator, self._site, conditions, np.random.default_rng(seed),
             tick=TICK, every=round(STEP / TICK), body=body,

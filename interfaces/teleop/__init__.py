@@ -1,20 +1,20 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
-from interfaces.teleop.operator import Correction, OperatorSite, SiteObserver, VirtualRobot
-from interfaces.teleop.robot import (
-    AdaptiveOffset,
+from interfaces.teleop.following_arm import (
+    FollowingArm,
     JointReference,
-    OffsetConfig,
     RobotHost,
     RobotHostConfig,
-    RobotSite,
     RobotSiteConfig,
 )
+from interfaces.teleop.operator import Correction, OperatorSite, SiteObserver, VirtualRobot
+from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig, RobotSite
 from interfaces.teleop.virtual_arm import OperatorSiteConfig, RobotLine, VirtualArm
 
 __all__ = [
     "AdaptiveOffset",
     "Correction",
+    "FollowingArm",
     "JointReference",
     "OffsetConfig",
     "OperatorSite",

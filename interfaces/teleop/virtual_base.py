@@ -111,8 +111,10 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     def _put(self, posture: Posture, now: float, reason: str) -> None:
         """Begin a drive at a posture where the real robot is, and tell of it."""
-        error = np.subtract(self.virtual(now), posture)
+        error, newest = np.subtract(self.virtual(now), posture), self.engine.newest
         self._set(posture, now)
+        # Ids of commands are the session's, not a drive's.
+        self.engine.count_from(newest)
         correction, truth = Correction(now, now, frozen_array(error), reason), self.engine.timeline
         self._site.inform(lambda listener: listener.corrected(correction, truth))
 

@@ -22,7 +22,7 @@ from interfaces.messages import Order, Outcome
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import Report, Sample
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import Correction, OperatorSite, RobotSite, VirtualArm
+from interfaces.teleop import Correction, FollowingArm, OperatorSite, VirtualArm
 from robots import puma560
 from vrs import (
     Cancel,
@@ -92,7 +92,7 @@ class Sites:
 
     def __init__(self, *before: Command | None) -> None:
         self.operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-        self.robot = RobotSite(MODEL, NOMINAL, now=0.0)
+        self.robot = FollowingArm(MODEL, NOMINAL, now=0.0)
         link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.02")))
         self.lab = Laboratory(self.operator, self.robot, link, np.random.default_rng(0))
         self.site = Site(self.operator.robot.engine)

@@ -12,7 +12,7 @@ from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, 
 from interfaces.messages import Order, Request
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from tests.interfaces.document_reader import DocumentReader, Row
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop
@@ -32,7 +32,7 @@ class Session:
     def __init__(self, profile: str, D: float, loss: float, seed: int, length: float) -> None:
         self.rng = np.random.default_rng(seed)
         operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-        robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+        robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
         conditions = Conditions(
             delay=delay_profile(profile), loss=BernoulliLoss(loss), duplicate=0.05, service=Service.DATAGRAM
         )

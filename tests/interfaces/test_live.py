@@ -17,7 +17,7 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.control import Lease
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.connection import Connection
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from tests.interfaces.live_rig import (
     HALT,
     MODEL,
@@ -94,7 +94,7 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
     assert made is not None
     receipts, begin, virtual, real, answers = made
     operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(f"constant:{delay}")))
     lab = Laboratory(operator, robot, link, np.random.default_rng(0))
     for t, command in script(begin):

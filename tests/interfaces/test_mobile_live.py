@@ -37,7 +37,7 @@ from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.connection import Connection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
-from interfaces.teleop.driving import DrivenConfig
+from interfaces.teleop.following_base import DrivenConfig
 from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.ipr.robot import place

@@ -10,7 +10,7 @@ import pytest
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.messages.sites import Orders
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
@@ -23,7 +23,7 @@ SERVICES = (Service.DATAGRAM, Service.IN_ORDER)
 
 def sites(delay: str, *, loss: float = 0.0, service: Service = Service.DATAGRAM, halts: bool = False) -> Laboratory:
     conditions = Conditions(delay=delay_profile(delay), loss=BernoulliLoss(loss), service=service)
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=HALT if halts else None))
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=HALT if halts else None))
     operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     return Laboratory(operator, robot, LinkConditions.symmetric(conditions), np.random.default_rng(1))
 
@@ -32,7 +32,7 @@ def move(lab: Laboratory, q: np.ndarray, *, now: float) -> None:
     lab.schedule(now, lambda t: lab.operator.robot.execute(MotionCommand(JointTarget(q)), now=t))
 
 
-def never_hears(robot: RobotSite, missing: int) -> None:
+def never_hears(robot: FollowingArm, missing: int) -> None:
     """Let an entry of the first epoch get lost between the link and the robot, however often it's sent."""
     receive = robot.receive
 

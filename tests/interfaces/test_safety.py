@@ -21,7 +21,7 @@ from interfaces.runtime.physics_process import tick_body
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.stream.access import Access
 from interfaces.teleop import RobotSiteConfig
-from interfaces.teleop.driving import DrivenConfig
+from interfaces.teleop.following_base import DrivenConfig
 from robots import load, onboard
 from robots.ipr.robot import place
 from robots.onboard import WatchdogConfig
@@ -72,8 +72,8 @@ def test_the_document_names_what_there_is() -> None:
     titles = list(diagrams().values())
     assert len(titles) == 3
     assert {"HubSession", "Leasing", "Lease"} <= titles[0]
-    assert {"RobotHost", "RobotSite", "Watchdog", "SensorMonitor", "Engine", "TickLoop", *FUNCTIONS} <= titles[1]
-    assert {"DrivenRobot", "Watchdog", "SoundPosition", "SensorWatch"} <= titles[2]
+    assert {"RobotHost", "FollowingArm", "Watchdog", "SensorMonitor", "Engine", "TickLoop", *FUNCTIONS} <= titles[1]
+    assert {"FollowingBase", "Watchdog", "SoundPosition", "SensorWatch"} <= titles[2]
 
 
 def test_what_the_diagrams_show_runs() -> None:

@@ -17,7 +17,7 @@ from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause
 from robots.bullet.rooms import Place, Room
 from robots.onboard.journey import Goal
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.teleop.rig import MODEL, Rig
 
 ROOM = Room("Test", 8.0, 6.0, places=(Place("A", 1.0, 2.0, 0.5), Place("B", 2.5, 3.0)), via=((2.0, 2.0),))
 JOBS = JobList(

@@ -11,9 +11,9 @@ from interfaces import Supervisor
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.messages.sites import LogEntry, Orders
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop.following_arm import ReceivedLog
 from interfaces.teleop.halt import Halt, HaltCause
-from interfaces.teleop.robot import ReceivedLog
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop
@@ -32,7 +32,7 @@ def laboratory(
     """Both sites, and an operator who moves, redirects, steers, stops and takes back for some seconds."""
     rng = np.random.default_rng(seed)
     operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     if conditions is None:
         delay = delay_profile(profile)
         conditions = Conditions(delay=delay, loss=BernoulliLoss(loss), duplicate=duplicate, service=service)
@@ -157,7 +157,7 @@ def test_an_arm_that_is_held_stops_and_goes_on_only_when_told() -> None:
 def test_after_an_outage_nothing_from_before_it_is_executed() -> None:
     """Watchdog: the robot stops within T_loss + 20 ms, whatever it does, and waits for a new epoch."""
     operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))
     lab = Laboratory(operator, robot, LinkConditions(), np.random.default_rng(0), tick=0.005)
     lab.schedule(
         1.0, lambda now: operator.robot.execute(MotionCommand(JointTarget(NOMINAL + 0.8), speed=0.1), now=now)
@@ -328,7 +328,7 @@ def test_what_was_under_way_to_a_robot_that_halted_isnt_expected_of_it() -> None
 
 
 def test_an_arm_that_has_stopped_may_be_held_elsewhere() -> None:
-    robot = RobotSite(MODEL, NOMINAL, now=0.0)
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0)
     robot.halt("somebody pulled the plug", now=1.0)
     robot.halt("it was pushed", now=2.0)
     np.testing.assert_allclose(robot.engine.timeline.sample(9.0), NOMINAL, rtol=0, atol=1e-12)

@@ -13,7 +13,7 @@ from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, interval_name, median
 from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import Correction, OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import Correction, FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Command
 from vrs.model import Array
@@ -85,7 +85,7 @@ def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Results:
 
 def _lab(seed: int, way: Conditions, D: float | None) -> Laboratory:
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     return Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 21)))
 
 

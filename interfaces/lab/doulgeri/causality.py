@@ -12,7 +12,7 @@ from interfaces.lab.claims import Claim, Findings, Study
 from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, script, target
 from interfaces.link import Conditions, ConstantDelay, LinkConditions
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
 from vrs.ledger import Receipt
 
@@ -75,7 +75,7 @@ def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands postponed at the operator's site and at the robot's, and how many both accepted or postponed."""
     rng = np.random.default_rng(seed)
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     way = Conditions(delay=ConstantDelay("constant", D_F))
     lab = Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
     mine: dict[int, float] = {}

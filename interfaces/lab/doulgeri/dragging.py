@@ -14,7 +14,7 @@ from interfaces.lab.output import INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, VirtualArm
 from vrs import Status, SteerCommand
 from vrs.comparison import best_lag
 from vrs.ledger import Receipt
@@ -57,7 +57,7 @@ def drag(seed: int, length: float) -> Results:
     rng = np.random.default_rng((seed, 9))
     offsets, speeds = hand(rng, length)
     begin = tool(HOME[None])[0]
-    operator, robot = OperatorSite(VirtualArm(MODEL, HOME, now=0.0)), RobotSite(MODEL, HOME, now=0.0)
+    operator, robot = OperatorSite(VirtualArm(MODEL, HOME, now=0.0)), FollowingArm(MODEL, HOME, now=0.0)
     way = Conditions(delay=delay_profile(DELAY), service=Service.DATAGRAM)
     lab = Laboratory(operator, robot, LinkConditions.symmetric(way), rng, tick=PERIOD)
     begun: list[float] = []

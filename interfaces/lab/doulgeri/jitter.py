@@ -25,7 +25,7 @@ from interfaces.lab.output import MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, clustered, interval_name
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from vrs import MotionCommand
 from vrs.comparison import compare_paths
 from vrs.ledger import Receipt
@@ -60,7 +60,7 @@ def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Result
     """
     acts = script(np.random.default_rng((seed, 1)), length)
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D, beat=BEAT))
+    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D, beat=BEAT))
     way = Conditions(delay=delay_profile(profile), service=Service.DATAGRAM)
     lab = Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 2)))
     begun: dict[int, float] = {}

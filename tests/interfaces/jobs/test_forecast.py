@@ -21,7 +21,7 @@ from interfaces.messages.jobs import (
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteConfig, RouteMap
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.teleop.rig import MODEL, Rig
 
 OPEN = RouteMap((10.0, 8.0), [], RouteConfig(0.4, 0.25))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
 from interfaces.recording.live import LiveRecorder, LiveRecording
-from interfaces.teleop import OperatorSite, RobotLine, RobotSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import FollowingArm, OperatorSite, RobotLine, RobotSiteConfig, VirtualArm
 from robots import puma560
 from vrs.commands import Command
 
@@ -27,7 +27,7 @@ class Driven:
         self.operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
         self.line = RobotLine(self.operator, way, np.random.default_rng(seed))
         self.line.connected = True
-        self.robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(beat=beat))
+        self.robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(beat=beat))
         self.recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), self.line, seed=seed, began=5e8)
         self.recorder.open()
         self.now = 0.0

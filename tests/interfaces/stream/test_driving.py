@@ -20,7 +20,7 @@ from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease
 from tests.interfaces.stream.served import make_hub
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.teleop.rig import MODEL, Rig
 from vrs import DriveCommand, Stop
 from vrs.commands import PositionQuery
 

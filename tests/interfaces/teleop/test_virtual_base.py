@@ -14,7 +14,7 @@ from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import Sample
 from interfaces.teleop import Correction, SiteObserver
 from interfaces.teleop.architectures.compositions import ESTIMATING
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.teleop.rig import MODEL, Rig
 from vrs import Engine, ManualClock
 from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline

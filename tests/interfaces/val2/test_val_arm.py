@@ -11,7 +11,7 @@ from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import ArmJob, JobList, JobStage, ListCommand, WaitJob
 from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
-from tests.interfaces.teleop.driving.rig import Rig
+from tests.interfaces.teleop.rig import Rig
 
 WAVE = """.PROGRAM other()
     TYPE "not this one"

@@ -1,4 +1,4 @@
-"""A mobile robot's site, live: an architecture for each epoch, the watchdog before it, and the way to rest."""
+"""A base that follows an operator: an architecture for each epoch, the watchdog before it, and the way to rest."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from typing_extensions import override
 from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport
 from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ArchitectureRobotSite, TimelineController
-from interfaces.teleop.connection import LOST, Host, OrderExecutor, lost
-from interfaces.teleop.driving.autonomy import Autonomy
-from robots.onboard import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
+from interfaces.teleop.autonomy import Autonomy
+from interfaces.teleop.connection import Host
+from interfaces.teleop.robot import LOST, RobotSite
+from robots.onboard import StopReason, WatchdogConfig
 from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
 from robots.onboard.following import PositionSource, SoundPosition
 from vrs.checks import validated, within
@@ -46,8 +47,10 @@ class DrivenConfig:
     """Without a watchdog, the operator is lost to what the robot does by itself after so long [s], in [0.1, 60]."""
 
 
-class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
-    """Follows the epochs of one operator's site. Times are by its clock, as the robot takes it to be [s]."""
+class FollowingBase(RobotSite[DriveOrders, DriveReport]):
+    """What runs beside a real mobile robot, all but its body: it follows the operator's path, epoch by epoch."""
+
+    rearms = True
 
     def __init__(
         self,
@@ -73,59 +76,39 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
             autonomy: What it does by itself; None for nothing.
             sight: What it sees of its surroundings, once; None where there's nothing new.
         """
+        self.config = DrivenConfig() if config is None else config
+        reported = max(0, math.floor(1000.0 * now))
+        super().__init__(self.config.watchdog, self.config.beat, now=now, reported=reported)
         self.autonomy, self._sight = autonomy, sight
         self._errand = 0
-        self._carries_on = False
+        self._unattended = False
         """Whether the operator was lost, and it goes on by itself nevertheless."""
         self._told: tuple[float, TaskReport] | None = None
-        self.config = DrivenConfig() if config is None else config
         self._make, self._limits, self._world, self._now = make, limits, world, now
         if not isinstance(position, SoundPosition):
             position = SoundPosition(position, lambda: self._now)
         self._position: SoundPosition = position
         self._site: ArchitectureRobotSite | None = None
-        self._watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
-        self.epoch, self.halted = 0, ""
         self._began = 0.0
-        self._driven_at = self._due = now
+        self._driven_at = now
         self._drive = STAND
         self._posture = position.posture()
-        self._newest: tuple[int, float, float] | None = None
-        self._refused, self._uncertainty = "", math.inf
-        self._verdict = Verdict.FRESH
-        self._reports = max(0, math.floor(1000.0 * now))
 
+    @override
     def join(self, orders: DriveOrders, reason: str, *, now: float) -> None:
-        """Meet an operator in the midst of the epoch of these orders: wait for the next one, and report why."""
-        self.epoch, self.halted, self._site = orders.epoch, reason, None
-        self._due = now
+        super().join(orders, reason, now=now)
+        self._site = None
 
-    def receive(
-        self, orders: DriveOrders, *, now: float, correction: float = 0.0, uncertainty: float = 0.0
-    ) -> None:
-        """Take in orders; those of an old epoch are ignored, as all are once it has stopped by itself.
-
-        Args:
-            orders: The message.
-            now: [s].
-            correction: What is to be added to its stamp [s].
-            uncertainty: Of that [s].
-        """
-        if orders.epoch > self.epoch and orders.start is not None and self.rests(now=now) and not self.doing:
-            self._begin(orders, now)
-        if orders.epoch != self.epoch:
-            return
-        self._uncertainty = uncertainty
-        counts = self._counts(orders, now, correction, uncertainty)
+    @override
+    def _heed(self, orders: DriveOrders, now: float, *, counts: bool) -> None:
         for errand in orders.errands:
             self._do(errand, now, counts=counts)
-        if not counts:
-            return
-        if self._newest is None or orders.number > self._newest[0]:
-            self._newest = orders.number, orders.sent_at, now
-            if orders.start is None:
-                # The drive is over: the robot stands, and keeps no place.
-                self._site = None
+
+    @override
+    def _follow(self, orders: DriveOrders, now: float, *, new: bool) -> None:
+        if new and orders.start is None:
+            # The drive is over: the robot stands, and keeps no place.
+            self._site = None
         if self._site is not None and not self.halted:
             self._site.receive(orders.packet, now=self._since(now))
 
@@ -141,7 +124,7 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
         if self.autonomy is None:
             self._errand = errand.number
             return
-        fresh = counts and (not self.halted or self._carries_on)
+        fresh = counts and (not self.halted or self._unattended)
         if not fresh and not errand.task.stops:
             return
         self._errand = errand.number
@@ -149,80 +132,47 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
             self._site = None
         self.autonomy.receive(errand.task, now=now)
 
-    def _begin(self, orders: DriveOrders, now: float) -> None:
-        """Follow a new epoch, from where the robot stands."""
-        start, here = orders.start, self._position.posture()
-        assert start is not None
+    @override
+    def _admits(self, orders: DriveOrders) -> bool:
+        start = orders.start
+        if start is None or self.doing:
+            return False
+        here = self._position.posture()
         if math.hypot(start.x - here.x, start.y - here.y) > self.config.begin_within:
             self._refused = TOO_FAR
-            return
-        if self._watchdog is not None and not self._armed(self._watchdog, orders.epoch, now):
-            return
-        self.epoch, self.halted, self._newest = orders.epoch, "", None
-        self._carries_on = False
+            return False
+        return True
+
+    @override
+    def _start(self, orders: DriveOrders, now: float) -> None:
+        assert orders.start is not None
+        self._unattended = False
         self._began = orders.began
-        self._site = self._make(start, self._since(now))
-
-    def _armed(self, watchdog: Watchdog, epoch: int, now: float) -> bool:
-        """Whether the watchdog lets a new epoch begin; the one before has ended with the robot at rest."""
-        self._watch(now)
-        if watchdog.state is WatchdogState.RUNNING:
-            watchdog.disarm(now=now)
-            watchdog.advance(now=now)
-            watchdog.stopped(watchdog.number, now=now)
-        return watchdog.arm(epoch, now=now).counts
-
-    def _counts(self, orders: DriveOrders, now: float, correction: float, uncertainty: float) -> bool:
-        """Whether the watchdog lets a message count."""
-        if self._watchdog is None:
-            return True
-        stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
-        verdict = self._watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
-        if verdict is Verdict.HALTED and self._carries_on:
-            return True
-        if verdict not in (Verdict.HALTED, Verdict.STALE_EPOCH, Verdict.UNKNOWN_EPOCH):
-            self._verdict = verdict
-            self._refused = "" if verdict.counts else f"the newest message was refused: {verdict.value}"
-        return verdict.counts
+        self._site = self._make(orders.start, self._since(now))
 
     def _since(self, now: float) -> float:
         """Time of the epoch [s]: the clocks may differ by as much as they are uncertain."""
         return max(0.0, now - self._began)
 
+    @override
     def _watch(self, now: float) -> None:
-        """Let the watchdog do what is due by now."""
-        if self._watchdog is None:
-            if self.doing and self._newest is not None and now >= self._newest[2] + self.config.lost_after:
-                self._lose(now)
-            return
-        if any(isinstance(action, BeginStop) for action in self._watchdog.advance(now=now)):
-            self._lose(now)
-            if not self._carries_on:
-                self._halt(lost(self._watchdog.config, self._verdict), now)
-        if self._carries_on and not self.doing:
-            self._carries_on = False
+        if self._unattended and not self.doing:
             self._halt(f"{LOST}, and it has carried on to the end", now)
-        if self._carries_on or (self.halted and self.rests(now=now)):
-            self._watchdog.stopped(self._watchdog.number, now=now)
+        silent = self._newest is not None and now >= self._newest[2] + self.config.lost_after
+        if self.watchdog is None and self.doing and silent:
+            self._lose(now)
+        super()._watch(now)
 
+    @property
+    @override
+    def _carries_on(self) -> bool:
+        return self._unattended
+
+    @override
     def _lose(self, now: float) -> None:
-        """The operator is lost: what the robot does by itself ends or goes on."""
         if self.autonomy is not None:
             self.autonomy.lost(LOST, now=now)
-            self._carries_on = self.doing and self._watchdog is not None
-
-    def advance(self, *, now: float) -> tuple[DriveReport, ...]:
-        """Do what is due by now [s], and say what is to be sent."""
-        self._watch(now)
-        if now < self._due:
-            return ()
-        self._due = now + self.config.beat
-        return (self._report(now),)
-
-    def next_deadline(self) -> float:
-        """When there's something to do [s]."""
-        watch = None if self._watchdog is None else self._watchdog.next_deadline()
-        return self._due if watch is None else min(self._due, watch)
+            self._unattended = self.doing and self.watchdog is not None
 
     def drive(self, *, now: float) -> Drive:
         """What to drive for the next period, from now [s] on."""
@@ -258,21 +208,21 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
         """Whether the robot is at rest."""
         return is_still(self._drive)
 
+    @override
     def halt(self, reason: str, *, now: float) -> None:
         """Stop along the arc that it's on, and wait for a new epoch."""
-        if self._watchdog is not None and self._watchdog.state is WatchdogState.RUNNING:
-            self._watchdog.stop(StopReason.FAULT, now=now)
+        self._stop_watching(StopReason.FAULT, now)
         self._halt(reason, now)
 
     def _halt(self, reason: str, now: float) -> None:
         if not self.halted:
             self.halted, self._due = reason, now
-        self._carries_on = False
+        self._unattended = False
         if self.autonomy is not None:
             self.autonomy.stop(reason, now=now)
 
+    @override
     def _report(self, now: float) -> DriveReport:
-        self._reports += 1
         site = None if self.halted else self._site
         autonomy = self.autonomy
         player = site.controller if site is not None and isinstance(site.controller, TimelineController) else None
@@ -290,7 +240,7 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
             play=None if player is None else player.reference.t_play,
             D=None if player is None else player.D,
             starved=player is not None and player.reference.starved,
-            uncertainty=self._uncertainty if math.isfinite(self._uncertainty) else None,
+            uncertainty=self._uncertainty,
             world=self._world(),
             errand=self._errand,
             doing=Doing.NOTHING if autonomy is None else autonomy.doing,
@@ -310,7 +260,7 @@ class DrivenRobot(OrderExecutor[DriveOrders, DriveReport]):
         return report
 
 
-class DrivenHost(Host[DrivenRobot, DriveOrders, DriveReport]):
+class DrivenHost(Host[FollowingBase, DriveOrders, DriveReport]):
     """See `Host`; what the body is to do is a drive for each control period."""
 
     orders = DriveOrders

@@ -10,15 +10,9 @@ import numpy as np
 from interfaces.jobs import ArmControl, RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, controller
+from interfaces.teleop.autonomy import Autonomy, Hands, JourneyPilot
 from interfaces.teleop.connection import HostConfig
-from interfaces.teleop.driving import (
-    Autonomy,
-    DrivenConfig,
-    DrivenHost,
-    DrivenRobot,
-    Hands,
-    JourneyPilot,
-)
+from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
@@ -73,8 +67,10 @@ class Rig:
         self.drives: list[tuple[float, float]] = []
         """What the body was told, a control period each."""
 
-    def _site(self, t: float) -> DrivenRobot:
-        return DrivenRobot(self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy)
+    def _site(self, t: float) -> FollowingBase:
+        return FollowingBase(
+            self._made, self.position, IPR_LIMITS, now=t, config=self.config, autonomy=self.autonomy
+        )
 
     def _made(self, start: Posture, since: float) -> ArchitectureRobotSite:
         assert since >= 0.0
@@ -87,7 +83,7 @@ class Rig:
         return self.k * TURN
 
     @property
-    def robot(self) -> DrivenRobot:
+    def robot(self) -> FollowingBase:
         assert self.host.site is not None
         return self.host.site
 

@@ -21,7 +21,7 @@ from robots.ipr.robot import BareBody, place
 from robots.onboard.driving import Posture
 from robots.onboard.following import SensorWatch, SoundPosition
 from robots.onboard.laser import LaserModel
-from tests.interfaces.teleop.driving.rig import Rig
+from tests.interfaces.teleop.rig import Rig
 
 BAD = [math.nan, math.inf, 1e300, -1e300]
 

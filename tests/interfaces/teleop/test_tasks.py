@@ -27,7 +27,7 @@ from interfaces.messages.jobs import (
 from interfaces.teleop.halt import HaltCause
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
-from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
+from tests.interfaces.teleop.rig import CONTROL, TURN, Rig
 from vrs.errors import InvalidValueError
 
 THERE = Goal(2.0, 4.0, math.pi / 2)

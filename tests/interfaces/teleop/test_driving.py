@@ -12,11 +12,11 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.drive_sites import DriveOrders
 from interfaces.messages.fields import Epoch
 from interfaces.teleop.architectures import ARCHITECTURES
-from interfaces.teleop.driving.robot import TOO_FAR
+from interfaces.teleop.following_base import TOO_FAR
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.virtual_base import HOLDS, MOVING
 from robots.onboard.driving import IPR_LIMITS, Posture
-from tests.interfaces.teleop.driving.rig import CONTROL, MODEL, TURN, Rig
+from tests.interfaces.teleop.rig import CONTROL, MODEL, TURN, Rig
 
 
 def within_limits(rig: Rig) -> bool:
