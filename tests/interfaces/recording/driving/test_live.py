@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robots.ipr.robot import place
-from tests.interfaces.teleop.driving.rig import CONTROL, TURN, Rig
 
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
@@ -22,7 +20,9 @@ from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
 from robots.bullet.rooms import Room
+from robots.mobile.robot import place
 from robots.onboard.journey import Goal
+from tests.interfaces.teleop.rig import CONTROL, TURN, Rig
 from vrs.comparison import match_paths, summed_up
 
 BEFORE = 4.0
