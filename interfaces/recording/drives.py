@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -70,11 +69,10 @@ class LiveDrives:
             newest=self._newest,
         )
 
-    def place(self) -> Iterator[RoomEntry]:
-        """The room, with its people and doors by the session's clock, as far as the room's is known."""
-        if self._room is not None:
-            self._shift_told = self._shift
-            yield _shifted(self._room, self._shift)
+    def rooms(self) -> tuple[RoomEntry, ...]:
+        """The room, its people and doors by the session's clock as far as it's known; none where there's none."""
+        self._shift_told = self._shift
+        return () if self._room is None else (_shifted(self._room, self._shift),)
 
     def follow(self, capture: Capture, *, now: float) -> None:
         """Tell what is so now [s]."""
@@ -84,7 +82,7 @@ class LiveDrives:
         if report.world is not None:
             self._shift = report.measured_at - report.world
         if abs(self._shift - self._shift_told) > _SHIFTED:
-            for entry in self.place():
+            for entry in self.rooms():
                 capture.add(now, entry)
         if report.doing is not Doing.NOTHING and robot.stands:
             x, y, theta = np.subtract(report.posture, capture.engine.timeline.sample(now)).tolist()

@@ -28,8 +28,6 @@ from interfaces.recording.track import (
     GAP,
     MEASURED,
     SampleTrack,
-    gap_lengths,
-    not_measured,
 )
 from interfaces.runs.drive_run import DriveCase, DriveRun, facts_of, row_of
 from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
@@ -168,7 +166,7 @@ class _Figures:
         track, rows = self._track, len(t)
         if np.array_equal(track.t[:rows], t):
             return track.play[:rows], track.q[:rows], track.reference[:rows]
-        self.missing += not_measured(track, t)
+        self.missing += track.not_measured(t)
         play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
         q[track.unmeasured(t)] = np.nan
         if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
@@ -188,7 +186,7 @@ class _Figures:
 
     def _gap(self, t: Array) -> float:
         """For how long nothing was measured of the real robot, between its samples [s]."""
-        return float(gap_lengths(self._track, t).sum())
+        return float(self._track.gap_lengths(t).sum())
 
 
 class RunFigures(_Figures):

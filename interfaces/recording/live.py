@@ -146,7 +146,7 @@ class LiveRecorder(Capture):
     @override
     def first(self) -> Iterator[Message]:
         if self._drives is not None:
-            yield from self._drives.place()
+            yield from self._drives.rooms()
         yield from super().first()
 
     def open(self) -> None:

@@ -131,6 +131,19 @@ class SampleTrack:
         inside = (left >= 0) & (t < gaps[np.maximum(left, 0), 1]) if len(gaps) else np.zeros(len(t), dtype=bool)
         return np.asarray(inside | (t < self.t[0] - 1e-6) | (t > self.t[-1] + 1e-6))
 
+    def gap_lengths(self, t: Array) -> Array:
+        """How long each span was in which nothing was measured [s], within times [s], (k,)."""
+        outside = np.array([self.t[0] - t[0], t[-1] - self.t[-1]])
+        return np.concatenate((self.gaps[:, 1] - self.gaps[:, 0], outside[outside > 1e-6]))
+
+    def not_measured(self, t: Array) -> list[str]:
+        """Says for how long nothing was measured within times [s], (k,), if there's such a time."""
+        lengths = self.gap_lengths(t)
+        if not len(lengths):
+            return []
+        what = f"samples of the real robot for {lengths.sum():.1f} s, {lengths.max():.1f} s on end at most"
+        return [f"{what}: nothing is compared there"]
+
 
 class Tracks:
     """The samples of both robots in a file."""
@@ -240,18 +253,3 @@ class Tracks:
             share, known = share[:, None], known[:, None]
         found[inside] = np.where(known, values[right - 1] + share * (values[right] - values[right - 1]), np.nan)
         return found
-
-
-def gap_lengths(track: SampleTrack, t: Array) -> Array:
-    """How long each span was in which nothing was measured [s], within times [s], (k,)."""
-    outside = np.array([track.t[0] - t[0], t[-1] - track.t[-1]])
-    return np.concatenate((track.gaps[:, 1] - track.gaps[:, 0], outside[outside > 1e-6]))
-
-
-def not_measured(track: SampleTrack, t: Array) -> list[str]:
-    """Says for how long nothing was measured within times [s], (k,), if there's such a time."""
-    lengths = gap_lengths(track, t)
-    if not len(lengths):
-        return []
-    what = f"samples of the real robot for {lengths.sum():.1f} s, {lengths.max():.1f} s on end at most"
-    return [f"{what}: nothing is compared there"]

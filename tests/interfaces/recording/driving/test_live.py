@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.messages.drive_sites import RobotTask
+from interfaces.messages.drive_sites import DriveReport, RobotTask
 from interfaces.messages.recording import Placement
 from interfaces.recording import Recording, open_recording
 from interfaces.recording.figures import summary
@@ -19,7 +20,7 @@ from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
-from robots.bullet.rooms import Room
+from robots.bullet.rooms import Person, Room
 from robots.mobile.robot import place
 from robots.onboard.journey import Goal
 from tests.interfaces.teleop.rig import CONTROL, TURN, Rig
@@ -211,11 +212,22 @@ def test_of_a_robot_that_drives_by_itself_the_virtual_one_is_with_it(tmp_path: P
 
 
 def test_what_walks_in_a_room_walks_by_the_sessions_clock(tmp_path: Path) -> None:
-    room = place("furnished")
-    made = Driven(tmp_path / "live.mcap", room=room)
+    ada = Person("Ada", 0.3, 1.7, (100.0, 110.0), (1.0, 2.0), (0.5, 0.5))
+    made = Driven(tmp_path / "live.mcap", room=replace(place("furnished"), people=(ada,)))
+    receive = made.line.receive
+
+    def heard(message, *, now):
+        """In its room the robot's time is another one."""
+        if isinstance(message, DriveReport):
+            message = replace(message, world=message.measured_at + 100.0)
+        receive(message, now=now)
+
+    made.line.receive = heard
     made.record()
     made.go(BEFORE)
     made.finish()
     with open_recording(made.path) as recording:
         assert recording.room is not None
-        assert recording.room.name == room.name
+        (walks,) = recording.room.people
+        assert walks.times == pytest.approx((0.0, 10.0), abs=0.05)
+        assert recording.room.name == place("furnished").name
