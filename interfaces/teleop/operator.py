@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import Sample, SiteReport
 from interfaces.teleop.halt import Halt, HaltCause
 from vrs.engine import Engine
 from vrs.ledger import Receipt
@@ -28,26 +28,6 @@ class Correction(NamedTuple):
     error: Array
     """By how much it was off, (n,) [rad]; of a base (x, y, θ) [m, m, rad]."""
     reason: str
-
-
-class SiteReport(Protocol):
-    """A message of a robot's site, of any kind of robot."""
-
-    @property
-    def epoch(self) -> int | None:
-        """That the robot follows; None before the first."""
-
-    @property
-    def number(self) -> int:
-        """It rises from message to message."""
-
-    @property
-    def sent_at(self) -> float:
-        """By the robot's clock, as it takes the operator's to be [s]."""
-
-    @property
-    def echo(self) -> tuple[int, float, float] | None:
-        """The newest orders heard: their number, when they were sent, and when they arrived [s]."""
 
 
 O = TypeVar("O")  # noqa: E741 - orders

@@ -11,21 +11,11 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
-from interfaces.messages.drive_sites import (
-    HALT,
-    ArcPacket,
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    RobotTask,
-    SensedPoints,
-    TaskReport,
-    arc_rows,
-)
+from interfaces.messages.control import SensedPoints
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import HALT, Doing, Errand, RobotTask, TaskReport
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import ArcPacket, DriveOrders, DriveReport, Sample, arc_rows
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.deviation import Deviation, PathDeviation

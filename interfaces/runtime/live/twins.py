@@ -12,9 +12,8 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
-from interfaces.messages.control import MOST_MESSAGES, Attached, State
+from interfaces.messages.control import MOST_MESSAGES, Attached, Postures, State
 from interfaces.messages.fields import Epoch
-from interfaces.messages.mobile import Postures
 from interfaces.messages.sites import Report
 from interfaces.runtime.live.process import warm
 from interfaces.stream.driving import DriveSite

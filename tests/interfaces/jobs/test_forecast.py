@@ -7,14 +7,15 @@ import math
 import pytest
 
 from interfaces.jobs import dry_run, time_needed
-from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import (
     ArmJob,
+    Doing,
     JobList,
     JobStage,
     ListCommand,
     MessageJob,
     MoveJob,
+    RobotTask,
     VoiceJob,
     WaitJob,
 )

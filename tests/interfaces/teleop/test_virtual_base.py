@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import DriveReport
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import DriveReport, Sample
 from interfaces.teleop import Correction, SiteObserver
 from interfaces.teleop.architectures.compositions import ESTIMATING
 from tests.interfaces.teleop.rig import MODEL, Rig
