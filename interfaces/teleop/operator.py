@@ -65,12 +65,10 @@ class SiteObserver(Protocol[R_contra, T_contra]):
 class VirtualRobot(Protocol[O_co, R_contra]):
     """What answers the operator at once, and what of that goes to the real robot. Times are the operator's [s]."""
 
-    @property
-    def engine(self) -> Engine:
-        """What the operator's commands make."""
-
-    def join(self, site: OperatorSite[Any]) -> None:
-        """Be the virtual robot of a site."""
+    engine: Engine
+    """What the operator's commands make."""
+    site: OperatorSite[Any]
+    """Where it's the virtual robot; that site says so."""
 
     def stop(self, *, now: float) -> None:
         """Let both robots come to rest."""
@@ -141,7 +139,7 @@ class OperatorSite(Generic[V_co]):
         self._measured_since = -math.inf
         self._packets = 0
         self._report: Any = None
-        robot.join(self)
+        robot.site = self
 
     @property
     def cause(self) -> HaltCause | None:

@@ -42,7 +42,7 @@ class LiveTwins(Protocol[V]):
     """Name of the room that both drive in; empty for arms."""
     operator: OperatorSite[V]
     """The operator's site."""
-    line: SiteLine[OperatorSite[V], Any, Any]
+    line: SiteLine[V, Any, Any]
     """To the real one."""
     site: Site | DriveSite
     """What a hub serves."""
