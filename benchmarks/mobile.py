@@ -14,9 +14,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
-from robots.ipr.body import MobileBody
-from robots.ipr.chassis import IPR, MICRO, Senses, SonarModel
-from robots.ipr.robot import BareBody, MobileRobot
+from robots.ipr.parameters import IPR, MICRO
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import Senses, SonarModel
+from robots.mobile.robot import BareBody, MobileRobot
 
 if TYPE_CHECKING:
     from benchmarks.results import Part

@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from interfaces.lab.localization.trial import Wanderer
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import IPR, MobileReality, Senses
-from robots.ipr.floor_plan import plan_map
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import plan_map
+from robots.mobile.robot import BareBody
 from robots.onboard import LaserModel, Localizer, Status
 
 room = apartment(7, ApartmentConfig(rooms=3, people=2))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.ipr.chassis import IPR, Senses
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import Senses
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import BareBody, place
 from robots.onboard import Goal, LaserModel
 from robots.onboard.driving import IPR_LIMITS, STAND, kept
 from robots.onboard.journey import GOING

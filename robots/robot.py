@@ -161,7 +161,14 @@ class Display:
 
 @dataclass(frozen=True, slots=True)
 class HeadCamera:
-    """A camera that pictures are made with."""
+    """A camera that pans and tilts, and that pictures are made with."""
+
+    neck: tuple[float, float, float]
+    """Where both axes cross, in the robot's frame [m]."""
+    reach: float
+    """How far the lens is before that [m]."""
+    body: Callable[[], LinkShape]
+    """What it may see of the robot, in the robot's frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +196,7 @@ class Robot:
     """None draws a base as a box, an arm as its frames and traces."""
     bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
-    `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
+    `robots.mobile.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
     devices: tuple[object, ...] = ()
     """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
     found_by: str = ""

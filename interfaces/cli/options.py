@@ -210,7 +210,7 @@ def room_of(text: str) -> Room:
         FormatError: If the file can't be read.
     """
     from robots.bullet.rooms import load_room
-    from robots.ipr.robot import PLACES, place
+    from robots.mobile.robot import PLACES, place
 
     if text in PLACES:
         return place(text)

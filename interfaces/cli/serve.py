@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractAsyncContextManager
 
     from interfaces.link import LinkConditions
+    from interfaces.recording.live import LiveRecording
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
@@ -263,15 +264,18 @@ class _Serving:
     offset: str
     """Of the robot that is started: how far it plays behind."""
 
-    def recorded(self) -> dict[str, Any]:
-        """What recordings say of the robot, and who is told why one failed; see `LiveRecording`."""
+    def recording(self, path: Path, *, over: bool = True) -> LiveRecording:
+        """What is recorded into a file, which may be written over."""
         from interfaces.messages.recording import OWN
+        from interfaces.recording.live import LiveRecording
 
-        return {
-            "offset": self.offset if self.robot_at is None else OWN,
-            "link_loss": OWN if self.link_loss is None else self.link_loss.value,
-            "failed": lambda problem: typer.echo(f"vrs: {problem}", err=True),
-        }
+        return LiveRecording(
+            path,
+            offset=self.offset if self.robot_at is None else OWN,
+            link_loss=OWN if self.link_loss is None else self.link_loss.value,
+            failed=lambda problem: typer.echo(f"vrs: {problem}", err=True),
+            over=over,
+        )
 
 
 async def _serve(serving: _Serving, access: Access) -> None:
@@ -315,8 +319,8 @@ async def _serve(serving: _Serving, access: Access) -> None:
         routes = [*operator.routes]
         parts: list[AbstractAsyncContextManager[object]] = [operator.running()]
         if operator.recording is not None:
-            shelf = Shelf(serving.recordings, served)
-            recordings = Recordings(operator.recording, operator.clock, shelf, access, **serving.recorded())
+            shelf, what = Shelf(serving.recordings, served), partial(serving.recording, over=False)
+            recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
             routes += recordings.routes
             parts.append(recordings.running())
         if val is not None:
@@ -356,16 +360,15 @@ def _operator(serving: _Serving, access: Access) -> LiveOperator:
     """Make the operator's site."""
     from interfaces.jobs import JobFile
     from interfaces.media import CameraConfig
-    from interfaces.recording.live import LiveRecording
     from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
     from interfaces.val2.val_arm import lasts
 
     record = serving.record
     config = LiveOperatorConfig(
         serving.robot, "", serving.conditions, serving.robot_token, serving.seed, software(), serving.link_loss,
-        recording=None if record is None else LiveRecording(record, **serving.recorded()),
+        recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
-        camera=CameraConfig(serving.camera) if serving.camera else None,
+        camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
     )  # fmt: skip
     return LiveOperator(config, access)
 

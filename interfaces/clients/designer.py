@@ -223,11 +223,6 @@ class Supervisor:
         """The answer to a question; see `Observer.observation`."""
         return self.observer.observation(number)
 
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Take a reply; those that come by the port have been taken already, and count once."""
-        self.designer.receive(message, now=now)
-        self.observer.receive(message, now=now)
-
     def advance(self, *, now: float) -> tuple[Issued | Observation, ...]:
         """Do what is due; what was heard of commands, then the answers."""
         if self._own is not None:

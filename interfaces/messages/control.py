@@ -529,6 +529,9 @@ class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"
     """As in `state`."""
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
     """As in `state`."""
+    drawn: Posture | None = None
+    """Where the virtual robot is drawn, where the posture estimator has it now; absent where that's `virtual`, as
+    in architectures without one."""
 
 
 Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -574,9 +577,9 @@ class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
     """What it reaches ahead and back from its axle, and its width [m]."""
 
 
-Question: TypeAlias = (
-    Hello | Ping | Pong | Acquire | TakeOver | Share | Release | Resume | Beat | Survey | Impair | Problem
-)
+LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume
+"""What a client asks of the lease; a `Lease` or a `Problem` answers it."""
+Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem
 """Control messages that a client sends."""
 Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network
 """Control messages that a server sends."""

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from typing_extensions import override
@@ -20,6 +20,7 @@ from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.messages.recording import (
     Anchor,
+    CellsEntry,
     CommandRecord,
     Direction,
     EditEntry,
@@ -27,12 +28,14 @@ from interfaces.messages.recording import (
     HistoryEntry,
     Late,
     LinkEntry,
+    Placement,
     ReceiptEntry,
+    RunEvent,
     Site,
 )
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
-from interfaces.recording.history import edit_entries, whole_entries
+from interfaces.recording.history import AnyTimeline, edit_entries, whole_entries
 from interfaces.recording.kinds import ARM, MOBILE
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
 from interfaces.teleop import Correction
@@ -55,6 +58,10 @@ _WATCHED = 64
 """Newest commands whose receipts are looked at for changes."""
 
 
+Cell: TypeAlias = tuple[int, int]
+"""Of the virtual environment: along x, along y."""
+
+
 class Put(Protocol):
     """What a capture writes with."""
 
@@ -62,12 +69,15 @@ class Put(Protocol):
         """Take a message of a time [s]."""
 
 
-class _Happened(NamedTuple):
-    """A command or a correction, and the timelines before and after it."""
+_What: TypeAlias = CommandRecord | Placement | tuple[Correction, Timeline]
 
-    what: CommandRecord | tuple[Correction, Timeline]
-    before: Timeline
-    after: Timeline
+
+class _Happened(NamedTuple):
+    """A command, a correction or a placement, and the timelines before and after it."""
+
+    what: _What
+    before: AnyTimeline
+    after: AnyTimeline
 
 
 class Capture(SiteObserver[Report, Timeline]):
@@ -109,12 +119,14 @@ class Capture(SiteObserver[Report, Timeline]):
         self._row = math.ceil(now / step - 1e-9)
         self._linked = {"forward": now, "backward": now}
         self._known: dict[int, int] = {}
+        self._cells: set[Cell] = set()
+        self._ever: set[Cell] = set()
         self._pose = Paced(POSE_RATE)
         self.links = Paced(LINK_RATE)
         """When links of the virtual robot are shown."""
         fresh = not engine.newest and not len(timeline) and timeline.start == now
-        self.late = None if fresh else engine.standing()
-        """How the engine stood; None where nothing had happened yet."""
+        self.late = None if fresh or self.kind is MOBILE else engine.standing()
+        """How an arm's engine stood; None where nothing had happened yet."""
         self._began = timeline, now
         for message in () if apart else self.first():
             self.add(now, message)
@@ -134,6 +146,32 @@ class Capture(SiteObserver[Report, Timeline]):
         """Note a correction."""
         self._note((correction, truth))
 
+    def place(self, engine: Engine, at: float, *, along: bool = False) -> None:
+        """Note that a virtual base begins a drive.
+
+        Args:
+            engine: Of that drive.
+            at: When [s].
+            along: Whether it only goes along with the real one, which drives by itself.
+        """
+        self.tell_happened()
+        self._known.clear()
+        self.engine = engine
+        x, y, theta = engine.timeline.initial.tolist()
+        self._note(Placement(0, at, (x, y, theta), along))
+
+    def learn(self, t: float, cells: Iterable[Cell]) -> None:
+        """Note the cells of the virtual environment at a time [s]; events: some are new, all are gone."""
+        now, before = set(cells), self._cells
+        if now == before:
+            return
+        self.add(t, CellsEntry(t, _flat(sorted(now - before)), _flat(sorted(before - now))))
+        if new := len(now - self._ever):
+            self.add(t, RunEvent(t, "learned", f"the virtual environment learned {new} cell{'s' * (new > 1)}"))
+        elif not now:
+            self.add(t, RunEvent(t, "forgot", "the virtual environment forgot all that it had learned"))
+        self._cells, self._ever = now, self._ever | now
+
     @override
     def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
         """Note an answer of the robot's."""
@@ -149,7 +187,7 @@ class Capture(SiteObserver[Report, Timeline]):
         """Let a run in virtual time fail: what it records is all that comes of it."""
         raise error
 
-    def _note(self, what: CommandRecord | tuple[Correction, Timeline]) -> None:
+    def _note(self, what: _What) -> None:
         before, self._timeline = self._timeline, self.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))
         if len(self._happened) >= _WAITING:
@@ -233,7 +271,10 @@ class Capture(SiteObserver[Report, Timeline]):
         while self._happened:
             what, before, after = self._happened.popleft()
             self._number += 1
-            if isinstance(what, CommandRecord):
+            if isinstance(what, Placement):
+                at, command_id = what.at, None
+                self.add(at, replace(what, number=self._number))
+            elif isinstance(what, CommandRecord):
                 at, receipt = what.at, None if what.receipt is None else self._named(what.receipt)
                 command_id = None if receipt is None else receipt.command_id
                 self.add(at, replace(what, number=self._number, receipt=receipt))
@@ -281,6 +322,10 @@ class Capture(SiteObserver[Report, Timeline]):
         """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
         for receipt in receipts:
             self.add(t, ReceiptEntry(t, site, self._named(receipt)))
+
+
+def _flat(cells: Iterable[Cell]) -> tuple[int, ...]:
+    return tuple(number for cell in cells for number in cell)
 
 
 def link_entry(direction: Direction, record: PacketRecord, size: int = 0) -> tuple[float, LinkEntry]:

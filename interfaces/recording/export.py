@@ -18,7 +18,7 @@ from interfaces.messages.recording import Anchor, ArcEntry, CommandPacket, Comma
 from interfaces.recording.history import arm_timeline
 from interfaces.recording.kinds import ARM
 from interfaces.recording.poses import quaternions
-from interfaces.recording.recording import Recording
+from interfaces.recording.recording import Deed, Recording
 from interfaces.recording.track import ESTIMATED, MEASURED
 from interfaces.runs.summary import UNIT
 from vrs.errors import FormatError, InvalidValueError
@@ -143,21 +143,22 @@ def _commands(recording: Recording) -> RecordingTable:
     )
 
 
-def _kind(entry: CommandRecord | Anchor) -> str:
-    if isinstance(entry, Anchor):
-        return "correction"
+def _kind(entry: Deed) -> str:
+    if not isinstance(entry, CommandRecord):
+        return "correction" if isinstance(entry, Anchor) else "placed"
     return "undo" if entry.command is None else str(entry.command.__struct_config__.tag)
 
 
-def _reason(entry: CommandRecord | Anchor) -> str:
+def _reason(entry: Deed) -> str:
     if isinstance(entry, Anchor):
         return entry.reason
-    return "" if entry.receipt is None else entry.receipt.reason
+    receipt = entry.receipt if isinstance(entry, CommandRecord) else None
+    return "" if receipt is None else receipt.reason
 
 
-def _content(entry: CommandRecord | Anchor) -> str | None:
+def _content(entry: Deed) -> str | None:
     """A command as JSON."""
-    if isinstance(entry, Anchor) or entry.command is None:
+    if not isinstance(entry, CommandRecord) or entry.command is None:
         return None
     return msgspec.json.encode(entry.command, enc_hook=plain).decode()
 
@@ -219,9 +220,8 @@ def _postures(recording: Recording, name: str, topic: str) -> RecordingTable:
 
 
 def _arcs(recording: Recording) -> RecordingTable:
-    """The newest timeline, a row an arc."""
-    timeline = recording.timeline
-    arcs = timeline.segments[:] if isinstance(timeline, ArcTimeline) else ()
+    """The newest timeline of each drive, a row an arc."""
+    arcs = [arc for drive in recording.drives if isinstance(drive, ArcTimeline) for arc in drive.segments]
     return _table(
         "segments",
         _rows([(number,) for number in range(len(arcs))], segment=int),

@@ -9,8 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
-from interfaces.recording.history import AnyTimeline, arm_timeline
+from interfaces.messages.recording import (
+    COLLISION,
+    OWN,
+    Anchor,
+    CommandPacket,
+    CommandRecord,
+    DriveFacts,
+    RunEvent,
+)
+from interfaces.recording.history import AnyTimeline, arm_timeline, sampled
 from interfaces.recording.kinds import ARM
 from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
@@ -28,7 +36,7 @@ from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
 from interfaces.runs.twin_run import ADAPTIVE, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
 from interfaces.teleop.architectures import Transport
-from robots.ipr.robot import Collision
+from robots.mobile.robot import Collision
 from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import PathMatch, match_paths, measured_rows, resample
 from vrs.errors import FormatError, InvalidValueError
@@ -178,16 +186,16 @@ class _Figures:
             raise self._fail(f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
 
-    def _shown(self, again: Rerun, until: float) -> AnyTimeline:
-        """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
+    def _shown(self, again: Rerun, until: float) -> tuple[AnyTimeline, ...]:
+        """The virtual robot's timelines: as the commands make them, which is exact, or by its recorded edits."""
         recording = self.recording
         if not again.missing and not again.difference:
-            return again.timeline
+            return again.drives
         why = again.difference or again.missing
         self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
         if recording.certain < until:
             self.missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
-        return recording.timeline
+        return recording.drives
 
     def _gap(self, t: Array) -> float:
         """For how long nothing was measured of the real robot, between its samples [s]."""
@@ -222,7 +230,7 @@ class RunFigures(_Figures):
         play, q_real, q_reference = self._measured(t)
         measured = measured_rows(q_real)
         again = rerun(recording)
-        shown = arm_timeline(self._shown(again, math.inf))
+        shown = arm_timeline(self._shown(again, math.inf)[-1])
         corrections = self._corrections()
         alone = self._alone() if corrections else shown
         if not np.isfinite(q_reference).all():
@@ -376,7 +384,8 @@ class DriveFigures(_Figures):
         _, real, drives = self._measured(t)
         packets = [entry for entry in recording.link if entry.direction == "forward"]
         track, case = self._track, self._case()
-        taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
+        driven = self._facts.length or math.inf
+        taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < driven]
         self.run = DriveRun(
             case=case,
             t=t,
@@ -404,11 +413,18 @@ class DriveFigures(_Figures):
             **facts_of(row_of(self.run)),
         }
 
-    def _case(self) -> DriveCase:
-        begin, facts = self.begin, self.begin.drive
+    @property
+    def _facts(self) -> DriveFacts:
+        facts = self.begin.drive
         assert facts is not None
+        return facts
+
+    def _case(self) -> DriveCase:
+        begin, facts = self.begin, self._facts
+        # Live, nothing is settled beforehand, and the robot alone knows what tells it where it is.
+        named = ("architecture", "operator") if self._live else ("architecture", "operator", "length", "position")
         try:
-            same = {name: getattr(facts, name) for name in ("architecture", "operator", "length", "position")}
+            same = {name: getattr(facts, name) for name in named}
             same |= {"robot": facts.body, "known": self.recording.robot, "seed": begin.seed or 0}
             return DriveCase(transport=Transport(facts.transport), delay=begin.delay, **same)
         except InvalidValueError as error:
@@ -421,15 +437,22 @@ class DriveFigures(_Figures):
             raise self._fail("holds less than two samples of the real robot")
         if max(float(t[-1] - t[0]), abs(float(t[0]))) >= MOST_ROWS * step:
             raise self._fail(f"is longer than the {MOST_ROWS} samples that are compared")
+        if self._live:
+            unmet, *others = self.recording.drives
+            # Until the robot was met, the virtual one stood somewhere else.
+            met = others[0].start if others and not len(unmet) else t[0]
+            # And a time in each gap, where nothing is known.
+            moments: Array = np.union1d(t, self._track.gaps.mean(axis=1))
+            return moments[moments >= met]
         first, last = round(float(t[0]) / step), round(float(t[-1]) / step)
         if last - first + 1 == len(t):
             return t
-        whole: Array = step * np.arange(first, last + 1, dtype=np.float64)
-        return whole
+        even: Array = step * np.arange(first, last + 1, dtype=np.float64)
+        return even
 
     def _virtual(self, t: Array) -> Array:
         """Postures of the virtual robot at times [s], (k, 3)."""
-        virtual = self._shown(rerun(self.recording), float(t[-1])).sample(t)
+        virtual = sampled(self._shown(rerun(self.recording), float(t[-1])), t)
         if not matchable(virtual):
             raise self._fail(f"its virtual robot drives further than {FARTHEST:g} m")
         return virtual

@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from typing_extensions import override
 
 from interfaces.messages import fields
-from interfaces.messages.recording import Begin, CommandRecord, End, RealSample, RunEvent
-from interfaces.messages.sites import Report, Sample
+from interfaces.messages.recording import (
+    OWN,
+    Begin,
+    CommandRecord,
+    End,
+    MeasuredPosture,
+    RealPosture,
+    RealSample,
+    RunEvent,
+)
+from interfaces.messages.sites import DriveReport, Report, Sample
 from interfaces.recording.capture import Capture, late_of
+from interfaces.recording.channels import Message
+from interfaces.recording.drives import LiveDrives
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
-from interfaces.teleop import Correction, RobotLine
+from interfaces.teleop import Correction
+from interfaces.teleop.architectures.compositions import CONTROL
+from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.samples import PERIOD
+from interfaces.teleop.virtual_base import VirtualBase
+from robots.bullet.rooms import Room
 from vrs.ledger import Receipt, Status
 from vrs.timeline import Timeline
 
@@ -53,6 +68,20 @@ class LiveRecording:
     """Is told once why nothing more is recorded."""
     over: bool = True
     """Whether a file that's there already is written over."""
+    robot: str = ""
+    """Name of a mobile robot, which its model's needn't be; the model's unless given."""
+    room: Room | None = None
+    """Where a mobile robot drives."""
+    architecture: str = OWN
+    """What a mobile robot does with the operator's path, by its name, where that's known."""
+
+
+class _Measured(NamedTuple):
+    """Where the real robot was at a time [s], and what is written of that."""
+
+    t: float
+    q: Sequence[float]
+    messages: tuple[Message, ...]
 
 
 class LiveRecorder(Capture):
@@ -63,28 +92,25 @@ class LiveRecorder(Capture):
     """
 
     def __init__(
-        self,
-        what: LiveRecording,
-        line: RobotLine,
-        *,
-        seed: int,
-        began: float,
-        now: float = 0.0,
+        self, what: LiveRecording, line: SiteLine[Any, Any, Any], *, seed: int, began: float, now: float = 0.0
     ) -> None:
         """Begin to take notes.
 
         Args:
             what: What is recorded, and where to.
-            line: From the operator's site to the robot; nobody else listens to that site.
+            line: From the operator's site, of any robot, to the robot; nobody else listens to that site.
             seed: Of the emulated link.
             began: Seconds since 1970 now.
             now: Session time [s].
         """
-        self._site, engine = line.operator, line.operator.robot.engine
-        super().__init__(engine, now=now, step=1.0 / RATE, every=False, apart=True)
+        self._site, robot = line.operator, line.operator.robot
+        drives = LiveDrives(line.operator, what.room, now=now) if isinstance(robot, VirtualBase) else None
+        engine = robot.engine
+        step = 1.0 / RATE if drives is None else CONTROL
+        super().__init__(engine, now=now, step=step, every=False, apart=True)
         self._site.listener = self
         self.path, self.since = what.path, now
-        self._what, self._link = what, line.link
+        self._what, self._link, self._drives = what, line.link, drives
         for way in (line.link.forward, line.link.backward):
             way.log.take()
         link, name = line.link.conditions.forward, engine.model.name
@@ -92,28 +118,35 @@ class LiveRecorder(Capture):
             t=now,
             robot=name,
             driver="live",
-            title=f"live {name}",
+            title=f"live {what.robot or name}",
             seed=seed,
             delay=fields.text(link.delay.name),
             offset=what.offset,
             service=str(link.service),
             link_loss=what.link_loss,
-            step=1.0 / RATE,
+            step=step,
             q=engine.timeline.sample(now).tolist(),
             lateness=str(engine.parameters["lateness"]),
             software=software(),
             began=began,
-            sampled=PERIOD,
+            sampled=PERIOD if drives is None else None,
             late=late_of(self.late),
+            drive=None if drives is None else drives.facts(what.robot or name, what.architecture),
         )
         self.recorder: Recorder | None = None
         """Writes the file, once there is one."""
         self._asked: OrderedDict[int, float] = OrderedDict()
-        self._samples: list[Sample] = []
+        self._samples: list[_Measured] = []
         self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._connected = self._halted = self._followed = False
         self._stopped, self._told = "", False
         self._rest: tuple[End, tuple[Receipt, ...]] | None = None
+
+    @override
+    def first(self) -> Iterator[Message]:
+        if self._drives is not None:
+            yield from self._drives.place()
+        yield from super().first()
 
     def open(self) -> None:
         """Make the file, with what is known so far; from any thread.
@@ -151,6 +184,8 @@ class LiveRecorder(Capture):
             self.tell(now, "up" if connected else "down", text)
         self.link("forward", self._link.forward.log.take())
         self.link("backward", self._link.backward.log.take())
+        if self._drives is not None:
+            self._drives.follow(self, now=now)
         t, q = self.sample(now=now)
         self.show_links(self.links, t, virtual=q)
         self._write_samples()
@@ -161,11 +196,10 @@ class LiveRecorder(Capture):
         samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
         if not samples:
             return
-        t = np.array([sample.t for sample in samples])
-        q = np.array([sample.q for sample in samples])
-        for now, joints, sample in zip(t.tolist(), q.tolist(), samples, strict=True):
-            reference = None if sample.reference is None else sample.reference.tolist()
-            self.add(now, RealSample(now, sample.play, joints, reference))
+        t, q = np.array([sample.t for sample in samples]), np.array([sample.q for sample in samples])
+        for sample in samples:
+            for message in sample.messages:
+                self.add(sample.t, message)
         self.show(self._real, t, q, real_pose)
         self.show_links(self._real_links, t, real=q)
 
@@ -180,6 +214,9 @@ class LiveRecorder(Capture):
 
     @override
     def corrected(self, correction: Correction, truth: Timeline) -> None:
+        if self._drives is not None:
+            self.place(self._site.robot.engine, correction.t)
+            return
         super().corrected(correction, truth)
         for event in correction_events([correction], self.model.prismatic):
             self.add(event.t, fields.cut(event))
@@ -195,18 +232,30 @@ class LiveRecorder(Capture):
             self.tell(now, "late", f"command {command_id} was late at the real robot: {late}")
 
     @override
-    def reported(self, report: Report, *, now: float) -> None:
+    def reported(self, report: Report | DriveReport, *, now: float) -> None:
         halted = bool(report.halted)
         if halted and not self._halted and self._followed:
             self.tell(now, "halted", f"the real robot stopped: {report.halted}")
         elif not halted and (self._halted or not self._followed):
             self.tell(now, "followed", "the real robot follows the operator")
         self._halted, self._followed = halted, self._followed or not halted
+        if isinstance(report, DriveReport):
+            t, posture, drive = report.measured_at, report.posture, report.drive
+            # Its own measurement is all that's known of where it truly is.
+            real = RealPosture(t, *posture, v=drive.v, w=drive.w, D=report.D)
+            self._measure(t, posture, real, MeasuredPosture(t, *posture))
 
     @override
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:
-        # What was measured before the recording began is compared with nothing in it.
-        self._samples += [one for one in samples if one.t >= self.since][: _SAMPLES - len(self._samples)]
+        # Of a mobile robot reports say more.
+        for one in () if self._drives is not None else samples:
+            q, reference = one.q.tolist(), None if one.reference is None else one.reference.tolist()
+            self._measure(one.t, q, RealSample(one.t, one.play, q, reference))
+
+    def _measure(self, t: float, q: Sequence[float], *messages: Message) -> None:
+        """Take a sample; what was measured before the recording began is compared with nothing in it."""
+        if t >= self.since and len(self._samples) < _SAMPLES:
+            self._samples.append(_Measured(t, q, messages))
 
     @override
     def failed(self, error: Exception) -> None:
@@ -245,7 +294,8 @@ class LiveRecorder(Capture):
         receipts: tuple[Receipt, ...] = ()
         if not self._stopped:
             self.advance(now=now, connected=self._connected)
-            receipts = self.engine.receipts
+            # Those of a mobile robot stand with its commands, and nothing changes them.
+            receipts = self.engine.receipts if self._drives is None else ()
             late = self._begin.late
             if late is not None:
                 receipts = tuple(one for one in receipts if one.command_id > late.newest)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.messages.recording import Anchor, CommandRecord, RunEvent
+from interfaces.messages.recording import Anchor, CommandRecord, Placement, RunEvent
 from interfaces.runs.twin_run import correction_text
 from vrs.commands import DriveCommand, Motion, MotionCommand
 from vrs.ledger import Receipt, Status
@@ -19,7 +19,7 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.recording.history import AnyTimeline, RecordedEdit
-    from interfaces.recording.recording import Recording
+    from interfaces.recording.recording import Deed, Recording
 
 CHANGED: Final = 1e-9
 """A predicted position that is off by more [rad] was falsified."""
@@ -206,11 +206,14 @@ def _happened(event: RunEvent) -> Iterator[Mark]:
         yield Mark(event.t, kind, event.text)
 
 
-def _told(entry: CommandRecord | Anchor, prismatic: Collection[int]) -> Iterator[Mark]:
+def _told(entry: Deed, prismatic: Collection[int]) -> Iterator[Mark]:
     """The mark of a command, or of what put the virtual robot elsewhere."""
     if isinstance(entry, Anchor):
         text = correction_text(entry.end, np.asarray(entry.error), entry.reason, prismatic)
         yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
+    elif isinstance(entry, Placement):
+        if not entry.along:
+            yield Mark(entry.at, MarkKind.CORRECTED, "the virtual robot was put where the real one stands")
     elif entry.receipt is not None and not _usual(entry):
         receipt = entry.receipt
         start, end = receipt.execute_at, receipt.end

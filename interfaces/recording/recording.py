@@ -10,7 +10,7 @@ from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,12 +25,13 @@ from interfaces.messages.recording import (
     End,
     GivenEntry,
     LinkEntry,
+    Placement,
     ReceiptEntry,
     RoomEntry,
     RunEvent,
 )
 from interfaces.recording.errors import Damage
-from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit, sampled
 from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
 from interfaces.recording.track import Log, SampleTrack, Tracks
@@ -42,6 +43,8 @@ from vrs.segment import times
 
 POSTURE = 3
 """Numbers of a posture."""
+Deed: TypeAlias = CommandRecord | Anchor | Placement
+"""What the operator's engine was told, or what put the virtual robot elsewhere."""
 
 
 def shows(begin: Begin) -> list[str]:
@@ -211,9 +214,9 @@ class Recording:
         return start, last
 
     @property
-    def commands(self) -> tuple[CommandRecord | Anchor, ...]:
+    def commands(self) -> tuple[Deed, ...]:
         """What the operator's engine was told, in order; numbers are missing where blocks are."""
-        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor))
+        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor | Placement))
 
     def receipts(self, site: Literal["virtual", "real"]) -> tuple[Receipt, ...]:
         """The newest truth about each command at a site, by command id."""
@@ -244,7 +247,7 @@ class Recording:
         except InvalidValueError as error:
             raise FormatError(str(self.path), f"a command from before it: {error}") from None
 
-    def _commands(self) -> list[CommandRecord | Anchor | ReceiptEntry | CommandPacket | GivenEntry]:
+    def _commands(self) -> list[Deed | ReceiptEntry | CommandPacket | GivenEntry]:
         return self.logs["/commands"].entries()
 
     @property
@@ -288,6 +291,16 @@ class Recording:
             raise FormatError(str(self.path), "the block with the timeline is destroyed")
         return edits
 
+    @property
+    def drives(self) -> tuple[AnyTimeline, ...]:
+        """The newest timeline of each drive, by their starts; of an arm there's one.
+
+        Raises:
+            FormatError: If none is known.
+        """
+        self._known()
+        return tuple(self._chain.drives)
+
     def timeline_at(self, t: float) -> AnyTimeline:
         """The timeline as it was known at a user time [s]: what came later isn't in it.
 
@@ -314,7 +327,7 @@ class Recording:
         return math.inf
 
     def virtual(self, t: ArrayLike) -> Array:
-        """Joints of the virtual robot, or its posture, computed from the newest timeline.
+        """Joints of the virtual robot, or its posture, computed from the newest timeline of each drive.
 
         Args:
             t: User time [s], scalar or (k,).
@@ -326,7 +339,7 @@ class Recording:
             NonFiniteTimeError: If t holds NaN or infinity.
         """
         moments = times(t)
-        found: Array = self.timeline.sample(moments).copy()
+        found: Array = sampled(self.drives, moments).copy()
         found[np.asarray(moments) > self.certain + 1e-9] = np.nan
         return found
 
@@ -365,7 +378,7 @@ class Recording:
     def room(self) -> RoomEntry | None:
         """Where a mobile robot drove; None if that isn't there."""
         rooms = [entry for entry in self.logs["/session"].entries() if isinstance(entry, RoomEntry)]
-        return rooms[0] if rooms else None
+        return rooms[-1] if rooms else None
 
     @property
     def learned(self) -> tuple[CellsEntry, ...]:

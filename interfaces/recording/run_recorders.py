@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from math import isnan
 from operator import itemgetter
 from pathlib import Path
@@ -17,7 +17,6 @@ from interfaces.messages.fields import cut, text
 from interfaces.messages.recording import (
     COLLISION,
     Begin,
-    CellsEntry,
     CommandPacket,
     Direction,
     DriveFacts,
@@ -46,7 +45,7 @@ from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
-from robots.ipr.robot import MobileRobot
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE
 from vrs.commands import Lateness
@@ -240,7 +239,8 @@ class DriveRecorder(_FileRecorder, Witness):
         self._add_poses(drive)
         self._add_packets("forward", end)
         self._add_packets("backward", end)
-        self._add_learned(drive)
+        for t, cells in drive.learned:
+            capture.learn(t, cells)
         for touch in drive.touched:
             capture.add(touch.time, RunEvent(touch.time, COLLISION, f"collision: {touch.thing}"))
         capture.whole(end)
@@ -317,25 +317,3 @@ class DriveRecorder(_FileRecorder, Witness):
         for number, (sent, size) in enumerate(self._sent[direction]):
             if number not in known:
                 self._capture.add(end, LinkEntry(direction, sent, size=size))
-
-    def _add_learned(self, drive: DriveRun) -> None:
-        """What came into the virtual environment and went; events are cells that are new, and that all are gone."""
-        before: set[tuple[int, int]] = set()
-        ever: set[tuple[int, int]] = set()
-        for t, cells in drive.learned:
-            now = set(cells)
-            if now == before:
-                continue
-            self._capture.add(t, CellsEntry(t, _flat(sorted(now - before)), _flat(sorted(before - now))))
-            if new := len(now - ever):
-                text = f"the virtual environment learned {new} cell{'s' * (new > 1)}"
-                self._capture.add(t, RunEvent(t, "learned", text))
-            elif not now:
-                self._capture.add(
-                    t, RunEvent(t, "forgot", "the virtual environment forgot all that it had learned")
-                )
-            before, ever = now, ever | now
-
-
-def _flat(cells: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    return tuple(number for cell in cells for number in cell)

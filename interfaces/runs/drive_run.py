@@ -13,8 +13,8 @@ from interfaces.messages.sites import ArchitectureReport, ArcPacket
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import MobileReality
-from robots.ipr.robot import PLACES, Collision, MobileRobot
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE, USUAL_BASE, Robot, load
 from vrs.checks import one_of, validated, within
@@ -114,7 +114,10 @@ class DriveRun:
         """How many drives were beyond the robot's limits of speed and acceleration."""
         limits, slack = self.case.real[0].base.limits, 1 + 1e-9
         v, w = self.drives.T
-        rise = np.abs(np.diff(v, prepend=0.0)) > limits.a_max * CONTROL * slack + 1e-12
+        lasted = np.diff(self.t, prepend=self.t[0] - CONTROL)
+        rise = (
+            np.abs(np.diff(v, prepend=0.0 if self.t[0] < CONTROL else v[0])) > limits.a_max * lasted * slack + 1e-12
+        )
         return int(np.sum(rise | (np.abs(v) > limits.v_max * slack) | (np.abs(w) > limits.w_max * slack)))
 
     def match(self) -> PathMatch:

@@ -8,7 +8,6 @@ import json
 import secrets
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,7 +19,6 @@ from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import Role
 from interfaces.recording.errors import RecordingError
-from interfaces.recording.live import LiveRecording
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer
@@ -32,6 +30,7 @@ from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:
+    from interfaces.recording.live import LiveRecording
     from interfaces.runtime.live.recording import SiteRecording
 
 STATE: Final = 0.25
@@ -64,10 +63,7 @@ class Recordings:
         clock: Clock,
         shelf: Shelf,
         access: Access,
-        *,
-        offset: str,
-        link_loss: str,
-        failed: Callable[[str], None],
+        what: Callable[[Path], LiveRecording],
     ) -> None:
         """Wait for pages.
 
@@ -76,12 +72,10 @@ class Recordings:
             clock: Session time.
             shelf: Where recordings are put.
             access: Who may do what: viewers look, replay and take copies, operators record.
-            offset: What a recording says of how far the robot plays behind, as it was asked for.
-            link_loss: What it says of what the robot does when messages stay away.
-            failed: Is told why a recording failed.
+            what: Says what a new recording is, into a file.
         """
         self._recording, self._clock, self._shelf, self._access = recording, clock, shelf, access
-        self._what = partial(LiveRecording, offset=offset, link_loss=link_loss, failed=failed, over=False)
+        self._what = what
 
         def allowed(token: str | None) -> bool:
             return not access.refusal(Role.VIEWER, token)

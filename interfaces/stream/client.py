@@ -49,16 +49,8 @@ UNKNOWN = "unknown: the session was lost before an answer came"
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
-Asked: TypeAlias = (
-    control.Acquire
-    | control.TakeOver
-    | control.Share
-    | control.Release
-    | control.Resume
-    | Survey
-    | Impair
-    | TaskOrder
-)
+Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder
+"""What a client may wish for."""
 Ask: TypeAlias = Callable[[int], Asked]
 """Makes a wish of its number."""
 Replied: TypeAlias = control.Lease | control.Problem | Network | Tasks

@@ -40,19 +40,9 @@ Welcomed: TypeAlias = control.Welcome | MobileWelcome
 News: TypeAlias = control.State | Postures | control.Network | Tasks | Seen | Plan
 """What is told of the robot and the way to it: of each kind the newest counts."""
 Value: TypeAlias = (
-    Request
-    | Reply
-    | Question
-    | Notice
-    | Welcomed
-    | Postures
-    | TaskOrder
-    | News
-    | Orders
-    | Report
-    | DriveOrders
-    | DriveReport
-)
+    Request | Reply | Question | Notice | Welcomed | Postures | TaskOrder | News
+    | Orders | Report | DriveOrders | DriveReport
+)  # fmt: skip
 """What crosses, in the order in which documents and fuzzers go through it."""
 T = TypeVar("T")
 

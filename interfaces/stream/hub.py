@@ -580,7 +580,8 @@ class Hub:
         if seat is None or not resumed:
             if full := self._full(hello.role):
                 return Problem(ProblemCode.FULL, full)
-            seat = self._seat(hello)
+            seat = self._seat(hello.name, hello.role)
+            self._seats[seat.key] = seat
         elif (before := self._served.get(seat)) is not None:
             before.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
             before.seat = None
@@ -597,19 +598,13 @@ class Hub:
 
     def join(self, name: str) -> SessionState:
         """Let in a client in this process: an operator without a connection, whose lease needs no beats."""
-        return self._made(SessionState(self._key(), name, Role.OPERATOR, local=True))
+        return self._seat(name, Role.OPERATOR, local=True)
 
-    def _seat(self, hello: control.Hello) -> SessionState:
-        seat = self._made(SessionState(self._key(), hello.name, hello.role))
-        self._seats[seat.key] = seat
-        return seat
-
-    def _made(self, seat: SessionState) -> SessionState:
+    def _seat(self, name: str, role: Role, *, local: bool = False) -> SessionState:
+        key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
+        seat = SessionState(key, name, role, local=local)
         seat.servlet = self.site.servlet(admit=lambda order: self.leasing.refusal(seat, order, self._now))
         return seat
-
-    def _key(self) -> str:
-        return base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
 
     def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcomed:
         config = self.config

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from interfaces.stream.driving import DriveServlet
 
 
-Wish: TypeAlias = (
-    control.Acquire | control.TakeOver | control.Share | control.Release | control.Resume | control.Beat
-)
-"""What a client asks of the lease."""
+Wish: TypeAlias = control.LeaseWish | control.Beat
+"""What a client asks of the lease, or says to keep it."""
 
 
 class SessionState:

@@ -37,9 +37,9 @@ from interfaces.messages.jobs import (
     TaskReport,
     VoiceJob,
 )
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import MobileRobot
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from robots.onboard.following import PositionSource
 from robots.onboard.journey import GOING, Goal, Journey, JourneyState

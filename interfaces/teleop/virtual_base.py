@@ -105,10 +105,17 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     def _put(self, posture: Posture, now: float, reason: str) -> None:
         """Begin a drive at a posture where the real robot is, and tell of it."""
-        error = np.subtract(self.virtual(now), posture)
+        error, newest = np.subtract(self.virtual(now), posture), self.engine.newest
         self._set(posture, now)
+        # Ids of commands are the session's, not a drive's.
+        self.engine.count_from(newest)
         correction, truth = Correction(now, now, frozen_array(error), reason), self.engine.timeline
         self.site.inform(lambda listener: listener.corrected(correction, truth))
+
+    @property
+    def period(self) -> float:
+        """T, between two commands [s]."""
+        return self._model.period
 
     def wish(self, v: float, w: float, *, issued_at: float, now: float, lasts: float = HOLDS) -> str:
         """Drive so from the next command on, as far as the limits allow, for a while.

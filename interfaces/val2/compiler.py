@@ -9,6 +9,7 @@ from __future__ import annotations
 from interfaces.val2.context import Code, Context, StepFunction, Warned
 from interfaces.val2.errors import ValError
 from interfaces.val2.forms import UNAVAILABLE
+from interfaces.val2.grammar import undefined
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
 from interfaces.val2.syntax import Instruction, Program, Step
@@ -21,28 +22,15 @@ def compiled(program: Program, context: Context) -> Code:
         ValError: If its structures don't match, or a label is missing.
     """
     x = ProgramCompiler(program, context)
-    steps = [_whatever(x, n, step) for n, step in enumerate(program.steps)]
-    steps.append(_step(x, len(steps), Step(Instruction("RETURN"))))
+    steps = [_whatever(x, n, step.statement) for n, step in enumerate(program.steps)]
+    steps.append(compiled_step(x, len(steps), Instruction("RETURN")))
     return Code(program, steps, x.names, len(x.kept))
 
 
-def refusal(step: Step, context: Context) -> ValError | None:
-    """Why a step that stands alone can never be done, by its text; None where its text is right."""
-    try:
-        x = ProgramCompiler(Program("", (), (step,)), context)
-    except ValError:
-        return None  # Labels and structures are those of its program.
-    try:
-        _step(x, 0, step)
-    except ValError as error:
-        return error
-    return None
-
-
-def _whatever(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
+def _whatever(x: ProgramCompiler, n: int, i: Instruction) -> StepFunction:
     """A step; of one that can't be, what fails when it's reached."""
     try:
-        return _step(x, n, step)
+        return compiled_step(x, n, i)
     except ValError as error:
         failure = error
 
@@ -52,8 +40,14 @@ def _whatever(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
     return fail
 
 
-def _step(x: ProgramCompiler, n: int, step: Step) -> StepFunction:
-    i = step.statement
+def compiled_step(x: ProgramCompiler, n: int, i: Instruction) -> StepFunction:
+    """A step of a program, counted from 0.
+
+    Raises:
+        ValError: If it can never be done, by its text.
+    """
+    if (error := undefined(i)) is not None:
+        raise error
     act = STATEMENTS[i.keyword].act if i.passed is None else _passed_over
     assert act is not None
     made: StepFunction = act(x, i, n)

@@ -227,7 +227,7 @@ class Expressions:
         """A closure of a function or an operator, of the kind that its row gives; its operands are of a kind."""
         row, given = row_of(e), e.arguments
         if "idle" in row.tags:
-            return self._idle(e, "" if row.gives == "string" else 0.0)
+            return self.idle(e, "" if row.gives == "string" else 0.0)
         if row.act is None:
             return _placed(OF_NAMES[row.name](self, e), [lambda s: s], e.at)
         if row.repeats and row.slots[-1].default is None:
@@ -242,7 +242,7 @@ class Expressions:
             return _placed(partial(act, self.context), parts, e.at)
         return _placed(act, parts, e.at) if parts else _constant(act())
 
-    def _idle(self, e: Apply, value: float | str) -> Closure:
+    def idle(self, e: Apply, value: float | str) -> Closure:
         """Of files and other tasks: 0 or an empty string, with a warning."""
         warning = Warned(f"{e.function} has no meaning here")
 

@@ -19,6 +19,7 @@ from typing import Any, Final, TypeAlias
 from interfaces.val2 import forms
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.functions import NEGATION, OPERATORS, row_of
+from interfaces.val2.instructions import STATEMENTS
 from interfaces.val2.rows import MISSING, TOO_MANY, Form, nearest
 from interfaces.val2.signals import SignalRule
 from interfaces.val2.syntax import (
@@ -29,6 +30,7 @@ from interfaces.val2.syntax import (
     Format,
     Instruction,
     Number,
+    Program,
     Text,
     Variable,
     children,
@@ -49,16 +51,17 @@ _SPELLINGS: Final = {
 _BASES: Final = {"B": 2, "O": 8, "H": 16}
 _SIGNED: Final = re.compile(r"(-?)([0-9.]+)")
 _END: Final = "the end of the line"
+_HEADER: Final = ".PROGRAM name(arguments)"
 _VALUE: Final = frozenset({"NUMBER", "STRING", "NAME", "LPAR"})
 _SIGNS: Final = frozenset({"PREFIX", "SIGN"})
 _OPERATOR: Final = frozenset({"INFIX", "SIGN", "EQUALS"})
 _SHOWN: Final = {
     "NUMBER": "a number", "STRING": "a string", "NAME": "a name", "FORMAT": "a format such as /F8.2",
     "LPAR": "'('", "RPAR": "')'", "LSQB": "'['", "RSQB": "']'", "COMMA": "','", "COLON": "':'", "EQUALS": "'='",
-    "SETTING": "a parameter", "MOTION": "a motion", "$END": _END,
+    "SETTING": "a parameter", "MOTION": "a motion", "PROGRAM_NAME": "the name of a program", "$END": _END,
 }  # fmt: skip
 """Tokens as errors name them; others by the word that they are."""
-_UNTOLD: Final = frozenset({"COMMENT", "CALL_OF_NUMBERS", "_CHANNEL", "_LAST", "KIND", "REST", "UNIT"})
+_UNTOLD: Final = frozenset({"COMMENT", "CALL_OF_NUMBERS", "_CHANNEL", "_LAST", "KIND", "REST", "UNIT", "BRACKETS"})
 """Tokens that errors don't name."""
 _PIECE: Final = re.compile(r"[#$]?[A-Za-z0-9][A-Za-z0-9_.]*|[=<>]+|.", re.DOTALL)
 """What errors quote."""
@@ -77,7 +80,7 @@ def read(text: str, start: str, line: int) -> Any:
 
     Args:
         text: The text.
-        start: Which rule of the grammar: `line`, `cell` or `expression`.
+        start: Which rule of the grammar: `line`, `header`, `cell` or `expression`.
         line: Number of the line, for errors.
 
     Raises:
@@ -122,12 +125,13 @@ def _unexpected(text: str, begin: int, start: str, line: int) -> ValError:
             parser.feed_token(token)
     read, allowed = parser.parser_state.value_stack, parser.accepts()
     row = next(filter(None, map(_row_of_keyword, reversed(read))), None)
+    form = row.usage if row is not None else _HEADER if start == "header" else ""
     if row is not None and what == _END and row.name == str(read[-1]).upper():
-        return syntax_error(f"allowed: {row.usage}", line, begin + 1, MISSING)
-    if row is not None and "$END" in allowed:
-        return syntax_error(f"unexpected {what}; allowed: {row.usage}", line, begin + 1)
-    form = "" if row is None else f"; form: {row.usage}"
-    return syntax_error(f"unexpected {what}; allowed: {_listed(allowed)}{form}", line, begin + 1)
+        return syntax_error(f"allowed: {form}", line, begin + 1, MISSING)
+    if form and "$END" in allowed:
+        return syntax_error(f"unexpected {what}; allowed: {form}", line, begin + 1)
+    behind = f"; form: {form}" if form else ""
+    return syntax_error(f"unexpected {what}; allowed: {_listed(allowed)}{behind}", line, begin + 1)
 
 
 def _row_of_keyword(node: Node) -> Form | None:
@@ -168,7 +172,7 @@ def _lark() -> Node:
         "\n".join([grammar, *terminals]),
         parser="lalr",
         lexer="contextual",
-        start=["line", "cell", "expression"],
+        start=["line", "header", "cell", "expression"],
         maybe_placeholders=True,
         transformer=_Trees(),
     )
@@ -178,6 +182,16 @@ def _terminal(name: str, words: Iterable[str], behind: str = "") -> str:
     """A terminal of words, which end where a name would, and what has to come behind them."""
     some = "|".join(word.replace(".", r"\.") for word in sorted(words))
     return rf"{name.upper()}.3: /(?ai:{some})(?![A-Za-z0-9_.]){behind}/"
+
+
+def undefined(i: Instruction) -> ValError | None:
+    """The error of a line whose word is no instruction; None where it's one."""
+    if i.keyword in forms.IGNORED or i.keyword in STATEMENTS:
+        return None
+    detail = f"{i.keyword}{nearest(i.keyword, forms.INSTRUCTIONS)}"
+    if i.keyword in ("ELSEIF", "ELIF"):
+        detail = f"{i.keyword}; allowed: ELSE on a line, and an IF of its own on the next"
+    return ValError("Undefined instruction", detail, place=i.at)
 
 
 def type_of(node: Node) -> str:
@@ -244,19 +258,11 @@ class _Trees:
         return Instruction(keyword.upper(), at=_at(keyword), passed=(rest or "").strip())
 
     def unknown(self, parts: list[Any]) -> Instruction:
-        """No keyword, and no assignment either.
-
-        Raises:
-            ValError: Always.
-        """
+        """No keyword, and no assignment either; see `undefined`."""
         word, rest = parts
         if rest and rest.startswith("=="):
             raise syntax_error("'==' compares, '=' assigns", word.line, rest.column)
-        keyword = word.upper()
-        detail = f"{keyword}{nearest(keyword, forms.INSTRUCTIONS)}"
-        if keyword in ("ELSEIF", "ELIF"):
-            detail = f"{keyword}; allowed: ELSE on a line, and an IF of its own on the next"
-        raise ValError("Undefined instruction", detail, place=_at(word))
+        return self.passed(parts)
 
     def switches(self, parts: list[Any]) -> Instruction:
         """ENABLE, DISABLE, and PARAMETER of what may be a parameter of V+: that's passed over.
@@ -316,12 +322,27 @@ class _Trees:
 
     def call(self, parts: list[Any]) -> Instruction:
         keyword, name, given = parts
-        if name[0] in "#$":
-            raise ValError("Syntax error", "allowed: the name of a program", place=_at(name))
         for token in filter(type_of, given or ()):
             raise ValError("Syntax error", f"unexpected {token}", place=_at(token))
         arguments = () if given in (None, [None]) else tuple(given)
         return Instruction(keyword.upper(), arguments, (), _at(keyword), program=name_of(name))
+
+    def header(self, parts: list[Any]) -> Program:
+        """A program without its steps."""
+        keyword, name, *parameters, comment = parts
+        given: dict[str, Variable] = {}
+        for variable in filter(None, parameters):
+            if given.setdefault(variable.name, variable) is not variable:
+                raise ValError("Duplicate name", variable.name, place=variable.at)
+        comment = comment and comment[1:].rstrip()
+        return Program(name_of(name), tuple(given.values()), (), comment, TextPosition(keyword.line, 1))
+
+    def parameter(self, parts: list[Any]) -> Variable:
+        """An argument's name; with brackets, a whole array's."""
+        token, brackets = parts
+        if brackets:
+            return Variable(name_of(token), (), _at(token), array=True)
+        return _target(self.variable([token, None]))
 
     def cell(self, parts: list[Any]) -> SignalRule:
         """A line of `.SIGNALS`."""

@@ -38,7 +38,7 @@ from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, 
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.rows import Form, OperandSlot, Origin
 from interfaces.val2.signals import reaction_to
-from interfaces.val2.structure import structure
+from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
     Apply,
     Compound,
@@ -62,14 +62,14 @@ Ask: TypeAlias = Callable[[], object]
 class ProgramCompiler(Expressions):
     """Makes closures of the steps of a program."""
 
-    def __init__(self, program: Program, context: Context) -> None:
-        """Find out what belongs together, and where the program's own names are.
+    def __init__(self, program: Program, context: Context, found: Structure | None = None) -> None:
+        """Find out what belongs together, unless that's given, and where the program's own names are.
 
         Raises:
             ValError: If its structures don't match, or a label is missing.
         """
-        self.program, self.structure = program, structure(program)
-        self.jumps, self.blocks = self.structure.jumps, self.structure.blocks
+        found = structure(program) if found is None else found
+        self.program, self.jumps, self.blocks = program, found.jumps, found.blocks
         scope: dict[str, int | VariableSlot] = {p.name: i for i, p in enumerate(program.parameters)}
         self.names = len(program.parameters)
         self.kept: dict[int, int] = {}
@@ -552,7 +552,7 @@ def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 
 def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    context, signal = x.context, x.of_kind("real", i.operands[0])
+    context, signal = x.context, x.of_kind("signal", i.operands[0])
 
     def watch(s: Slots) -> int:
         if i.program:

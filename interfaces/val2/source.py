@@ -8,29 +8,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import Final
+from typing import Final, TypeAlias
 
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
+from interfaces.val2.grammar import name_of, undefined
 from interfaces.val2.memory import MOST_DIMENSIONS
-from interfaces.val2.parser import (
-    Reading,
-    directive,
-    indented,
-    lines_of,
-    read_program,
-    read_steps,
-    split_comment,
-    unknown_directive,
-    whole,
-)
+from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
-from interfaces.val2.rows import nearest_word
+from interfaces.val2.rows import nearest, nearest_word
 from interfaces.val2.signals import SignalRule
-from interfaces.val2.syntax import Apply, Expression, Number, Program, Text, Variable
+from interfaces.val2.syntax import BLANK, Apply, Expression, Number, Program, Step, Text, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
 
 DECIMALS: Final = 9
@@ -40,7 +31,28 @@ _NUMBER: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[Ee][+-]?[0-9
 _PREFIXES: Final = {".LOCATIONS": ("", "#"), ".REALS": ("",), ".STRINGS": ("$",)}
 """Of names in the sections of values."""
 _SECTIONS: Final = (*_PREFIXES, ".SIGNALS")
+DIRECTIVES: Final = (".PROGRAM", ".END", *_SECTIONS)
+"""What lines of a file may begin with, beside what programs hold."""
+_DIRECTIVE: Final = re.compile(r"\s*(\.[A-Za-z]+)(?![A-Za-z0-9_.])", re.ASCII)
 _ELEMENT: Final = re.compile(r"[0-9]{1,6}")
+MOST_ERRORS: Final = 100
+"""Lines that can't be read, of which is told."""
+_HEADER: Final = re.compile(r"\s*\.PROGRAM\s+([A-Za-z][A-Za-z0-9_.]*)", re.IGNORECASE | re.ASCII)
+_LINE: Final = re.compile(r"\s*([0-9]+(?![A-Za-z0-9_.]))?\s*([A-Za-z][A-Za-z0-9_.]*)?\s*(\[|=(?!=))?", re.ASCII)
+_JUMP: Final = re.compile(r"\b(GOTO\b|THEN\s*[0-9]+\s*(;|$))", re.IGNORECASE)
+_WORD: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9_.]*")
+_STAND_INS: Final = {
+    "IF": "IF TRUE THEN", "ELSE": "ELSE", "END": "END", "WHILE": "WHILE TRUE DO", "DO": "DO", "UNTIL": "UNTIL TRUE",
+    "FOR": "FOR n = 1 TO 1", "CASE": "CASE 1 OF", "VALUE": "VALUE 1:", "ANY": "ANY",
+}  # fmt: skip
+"""What keeps a structure whole where one of its lines can't be read."""
+_SHAPES: Final = (
+    ("IF", re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE)),
+    ("WHILE", re.compile(r"\bDO\s*(;|$)", re.IGNORECASE)),
+    ("CASE", re.compile(r"\bOF\s*(;|$)", re.IGNORECASE)),
+    ("FOR", re.compile(r"=.*\bTO\b", re.IGNORECASE)),
+)
+"""How lines look that begin a structure, whatever their first word."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +80,17 @@ class SourceFile:
         """Of all variables."""
         return (*self.locations, *self.reals, *self.strings)
 
+    @property
+    def undefined(self) -> tuple[ValError, ...]:
+        """The errors of steps whose words are no instructions: those of programs that come there."""
+        steps = [(p.name, n, step) for p in self.programs for n, step in enumerate(p.steps, 1)]
+        found = [(error, name, n) for name, n, step in steps if (error := undefined(step.statement)) is not None]
+        return tuple(error.at(program=name, step=n) for error, name, n in found)
+
+
+Reading: TypeAlias = Generator[int, None, SourceFile]
+"""Reads a text in steps: yields how many characters each took, and returns what the text holds."""
+
 
 def parse_file(text: str, name: str) -> SourceFile:
     """What the text of a file holds.
@@ -79,48 +102,159 @@ def parse_file(text: str, name: str) -> SourceFile:
     Raises:
         ValError: If it can't be read; its place is in the file.
     """
-    return whole(read_file(text, name))
+    return _whole(read_file(text, name))
 
 
-def read_file(text: str, name: str) -> Reading[SourceFile]:
-    """Read a file in steps, as `parse_file` does at once."""
-    lines, i, section = lines_of(text), 0, ""
-    programs: dict[str, Program] = {}
-    entries: dict[str, dict[Variable, Value]] = {word: {} for word in _PREFIXES}
-    rules: list[SignalRule] = []
-    while i < len(lines):
-        yield len(lines[i])
-        word, program, number = directive(lines[i]), None, i + 1
-        code = split_comment(lines[i], number)[0] if word == "" or word in _SECTIONS else ""
-        if word == ".PROGRAM":
-            program, i = yield from read_program(lines, i)
-        elif word == ".END" or word in _SECTIONS:
-            behind = indented(code) + len(word)
-            if code[behind:].strip():
-                raise syntax_error(f"allowed: {word} alone on its line", number, indented(code, behind) + 1)
-            i += 1
+def parse_program(text: str) -> Program:
+    """The program of a text from `.PROGRAM` on; `.END` may be missing.
+
+    Raises:
+        ValError: If it isn't one program.
+    """
+    program, *others = parse_file(text, "").programs or (None,)
+    if program is None or directive(lines_of(text)[program.at.line - 1]) != ".PROGRAM":
+        raise syntax_error("allowed: .PROGRAM name(arguments)", program.at.line if program else 1, 1)
+    if others:
+        raise syntax_error("one program is allowed", others[0].at.line, 1)
+    return program
+
+
+def directive(line: str) -> str:
+    """The directive that a line begins with, upper case; empty if there's none."""
+    if not line.lstrip().startswith("."):
+        return ""
+    found = _DIRECTIVE.match(line)
+    return found[1].upper() if found else "."
+
+
+def indented(text: str, begin: int = 0) -> int:
+    """Where the first character that isn't blank stands, from a place on, counted from 0."""
+    return len(text) - len(text[begin:].lstrip())
+
+
+def _whole(reading: Reading) -> SourceFile:
+    """What a reading comes to, without a pause."""
+    while True:
+        try:
+            next(reading)
+        except StopIteration as stop:
+            source: SourceFile = stop.value
+            return source
+
+
+def read_file(text: str, name: str, unreadable: dict[int, ValError] | None = None) -> Reading:
+    """Read a file in steps, as `parse_file` does at once.
+
+    Args:
+        text: Its text.
+        name: Its name.
+        unreadable: Takes the error of each line that can't be read, by its number; in such a line's place stands
+            one that is the same part of a structure, with the same label. Without it the first error is raised, but
+            a line whose word is no instruction is kept: it's an error where a program comes there.
+    """
+    file = _File(name)
+    for n, line in enumerate(lines_of(text), 1):
+        yield len(line)
+        try:
+            file.read(line, n, strict=unreadable is not None)
+        except ValError as error:
+            placed = error.at(program=file.program.name if file.program is not None else "")
+            if unreadable is None or len(unreadable) == MOST_ERRORS:
+                raise placed from None
+            unreadable[n] = placed
+            file.stand_in(line, n, error)
+    file.end_program()
+    return file.source()
+
+
+class _File:
+    """What has been read of a file, line by line."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._programs: dict[str, Program] = {}
+        self._entries: dict[str, dict[Variable, Value]] = {word: {} for word in _PREFIXES}
+        self._rules: list[SignalRule] = []
+        self._section = ""
+        self._steps: list[Step] = []
+        self.program: Program | None = None
+        """The one that is being read, without its steps."""
+
+    def read(self, line: str, number: int, *, strict: bool) -> None:
+        """Take a line.
+
+        Raises:
+            ValError: If it can't be read.
+        """
+        word = directive(line)
+        if word == ".END" and self.program is not None:
+            self.end_program(trimmed=False)
+        elif word and word not in DIRECTIVES:
+            detail = f"{line.split(maxsplit=1)[0]}{nearest(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
+            raise syntax_error(detail, number, indented(line) + 1, "Undefined directive")
         elif word:
-            raise unknown_directive(lines[i], number)
-        elif not section and code.strip():
-            if programs:
-                raise syntax_error("allowed: .PROGRAM name(arguments)", number, indented(code) + 1)
-            stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(name).stem)
-            called = grammar.name_of(stem if stem[:1].isalpha() else f"p{stem}")
-            steps, i = yield from read_steps(lines, i, called)
-            program = Program(called, (), steps, None, TextPosition(number, 1))
+            self.end_program()
+            self._directive(word, line, number)
+        elif self.program is not None:
+            self._steps.append(read_line(line, number))
+            if strict and (error := undefined(self._steps[-1].statement)) is not None:
+                self._steps.pop()
+                raise error
+        elif (code := split_comment(line, number)[0]).strip():
+            self._value(code, line, number, strict=strict)
+
+    def _directive(self, word: str, line: str, number: int) -> None:
+        self._section = word if word in _SECTIONS else ""
+        if word == ".PROGRAM":
+            self._begin(parse_header(line, number))
+            return
+        code = split_comment(line, number)[0]
+        behind = indented(code) + len(word)
+        if code[behind:].strip():
+            raise syntax_error(f"allowed: {word} alone on its line", number, indented(code, behind) + 1)
+
+    def _value(self, code: str, line: str, number: int, *, strict: bool) -> None:
+        if self._section == ".SIGNALS":
+            self._rules.append(parse_rule(code, number))
+        elif self._section:
+            variable, value = _entry(self._section, code, number)
+            self._entries[self._section][variable] = value
+        elif self._programs:
+            raise syntax_error("allowed: .PROGRAM name(arguments)", number, indented(code) + 1)
         else:
-            if code.strip() and section == ".SIGNALS":
-                rules.append(parse_rule(code, number))
-            elif code.strip():
-                variable, value = _entry(section, code, number)
-                entries[section][variable] = value
-            i += 1
-        if word:
-            section = word if word in _SECTIONS else ""
-        if program is not None and programs.setdefault(program.name, program) is not program:
+            stem = re.sub(r"[^A-Za-z0-9_.]", "", PurePath(self._name).stem)
+            self._begin(Program(name_of(stem if stem[:1].isalpha() else f"p{stem}"), at=TextPosition(number, 1)))
+            self.read(line, number, strict=strict)
+
+    def _begin(self, program: Program) -> None:
+        if program.name in self._programs:
             raise ValError("Duplicate program", program.name, place=program.at)
-    locations, reals, strings = (tuple(NamedValue(*entry) for entry in given.items()) for given in entries.values())
-    return SourceFile(name, tuple(programs.values()), locations, reals, strings, tuple(rules))
+        self.program, self._steps = program, []
+
+    def end_program(self, *, trimmed: bool = True) -> None:
+        """Put the program away that is being read; blank lines at its end don't count where no `.END` says so."""
+        while trimmed and self._steps and self._steps[-1] == Step(BLANK):
+            self._steps.pop()
+        if self.program is not None:
+            self._programs[self.program.name] = replace(self.program, steps=tuple(self._steps))
+        self.program = None
+
+    def stand_in(self, line: str, number: int, error: ValError) -> None:
+        """Take something in the place of a line that can't be read."""
+        if directive(line) == ".PROGRAM":
+            found = _HEADER.match(line)
+            known = found is not None and name_of(found[1]) not in self._programs
+            name = name_of(found[1]) if found is not None and known else f"{found[1][:8] if found else ''}l{number}"
+            self._begin(Program(name, at=TextPosition(number, 1)))
+        elif self.program is not None:
+            self._steps.append(_stand_in(line, number, error))
+
+    def source(self) -> SourceFile:
+        """What the file holds."""
+        locations, reals, strings = (
+            tuple(map(NamedValue, given, given.values())) for given in self._entries.values()
+        )
+        return SourceFile(self._name, tuple(self._programs.values()), locations, reals, strings, tuple(self._rules))
 
 
 def _variable(code: str, line: int, prefixes: tuple[str, ...]) -> tuple[Variable, int]:
@@ -138,7 +272,7 @@ def _variable(code: str, line: int, prefixes: tuple[str, ...]) -> tuple[Variable
     indices = [] if found[2] is None else [part.strip() for part in found[2].split(",")]
     if len(indices) > MOST_DIMENSIONS or not all(_ELEMENT.fullmatch(part) for part in indices):
         raise ValError("Syntax error", "allowed: one to three indices", place=at)
-    return Variable(grammar.name_of(found[1]), tuple(Number(float(n)) for n in indices), at), found.end()
+    return Variable(name_of(found[1]), tuple(Number(float(n)) for n in indices), at), found.end()
 
 
 def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
@@ -195,16 +329,6 @@ def numbers_of(location: Location) -> tuple[float, ...]:
     return tuple(round(value, DECIMALS) + 0.0 for value in to_oat(location))
 
 
-def parse_rule(text: str, line: int = 1) -> SignalRule:
-    """The rule of a line such as `1001 = SIG(1) AFTER 2`.
-
-    Raises:
-        ValError: If it isn't one.
-    """
-    rule: SignalRule = grammar.read(text, "cell", line)
-    return rule
-
-
 def print_rule(rule: SignalRule) -> str:
     """The line of a rule."""
     shown = f"{rule.signal} = {print_expression(rule.value)}"
@@ -237,69 +361,19 @@ def _printed(section: str, rows: list[str]) -> str:
     return "\n".join([section, *rows, ".END", ""]) if rows else ""
 
 
-MOST_ERRORS: Final = 100
-"""Lines that can't be read, of which is told."""
-_HEADER: Final = re.compile(r"\s*\.PROGRAM\s+([A-Za-z][A-Za-z0-9_.]*)", re.IGNORECASE | re.ASCII)
-_LINE: Final = re.compile(r"\s*([0-9]+(?![A-Za-z0-9_.]))?\s*([A-Za-z][A-Za-z0-9_.]*)?\s*(\[|=(?!=))?", re.ASCII)
-_JUMP: Final = re.compile(r"\b(GOTO\b|THEN\s*[0-9]+\s*(;|$))", re.IGNORECASE)
-_WORD: Final = re.compile(r"[#$]?[A-Za-z][A-Za-z0-9_.]*")
-_STAND_INS: Final = {
-    "IF": "IF TRUE THEN", "ELSE": "ELSE", "END": "END", "WHILE": "WHILE TRUE DO", "DO": "DO", "UNTIL": "UNTIL TRUE",
-    "FOR": "FOR n = 1 TO 1", "CASE": "CASE 1 OF", "VALUE": "VALUE 1:", "ANY": "ANY",
-}  # fmt: skip
-"""What keeps a structure whole where one of its lines can't be read."""
-_SHAPES: Final = (
-    ("IF", re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE)),
-    ("WHILE", re.compile(r"\bDO\s*(;|$)", re.IGNORECASE)),
-    ("CASE", re.compile(r"\bOF\s*(;|$)", re.IGNORECASE)),
-    ("FOR", re.compile(r"=.*\bTO\b", re.IGNORECASE)),
-)
-"""How lines look that begin a structure, whatever their first word."""
-
-
-def read_all(text: str, name: str) -> tuple[SourceFile, dict[int, ValError]]:
-    """What can be read of a file, and the error of each line that can't, by its number.
-
-    In the place of such a line stands one that is the same part of a structure, with the same label.
-    """
+def read_all(text: str, name: str) -> tuple[SourceFile, dict[int, ValError], set[str]]:
+    """What can be read of a file; the error of each line that can't be, by its number; the names in those lines."""
     errors: dict[int, ValError] = {}
     try:
-        lines = lines_of(text)
+        source = _whole(read_file(text, name, errors))
     except ValError as error:
-        return SourceFile(name), {1: error.at(place=TextPosition(1, 1))}
-    while len(errors) < MOST_ERRORS:
-        try:
-            return parse_file("\n".join(lines), name), errors
-        except ValError as error:
-            number = error.place.line if error.place is not None else len(lines)
-            if number in errors and not lines[number - 1]:
-                break
-            stands = "" if number in errors else _stand_in(lines[number - 1], number, error)
-            lines[number - 1] = stands
-            errors.setdefault(number, error)
-    return SourceFile(name), errors
+        return SourceFile(name), errors or {1: error.at(place=TextPosition(1, 1))}, set()
+    lines = lines_of(text) if errors else []
+    return source, errors, {name_of(word) for n in errors for word in _WORD.findall(lines[n - 1])}
 
 
-def words_of(text: str, numbers: Iterable[int]) -> set[str]:
-    """The names in lines that can't be read: they may have been set there."""
-    wanted = list(numbers)
-    try:
-        lines = lines_of(text) if wanted else []
-    except ValError:
-        return set()
-    return {grammar.name_of(word) for n in wanted for word in _WORD.findall(lines[n - 1])}
-
-
-def _stand_in(line: str, number: int, error: ValError) -> str:
-    """What takes the place of a line that can't be read."""
-    if directive(line) == ".PROGRAM":
-        found = _HEADER.match(line)
-        named = "" if found is None else found[1]
-        return (
-            f".PROGRAM {named}" if named and error.what != "Duplicate program" else f".PROGRAM {named[:8]}l{number}"
-        )
-    if directive(line):
-        return ""
+def _stand_in(line: str, number: int, error: ValError) -> Step:
+    """What takes the place of a step that can't be read."""
     head = _LINE.match(line)
     label, word, assigns = head.groups() if head is not None else (None, None, None)
     keyword = (word or "").upper()
@@ -308,8 +382,5 @@ def _stand_in(line: str, number: int, error: ValError) -> str:
         keyword = nearest_word(keyword, forms.INSTRUCTIONS) or next(shaped, "")
     jumps = keyword == "IF" and _JUMP.search(line)
     stands = "" if assigns or jumps else _STAND_INS.get(keyword, "")
-    return f"{_label(label, error)} {stands}".strip()
-
-
-def _label(label: str | None, error: ValError) -> str:
-    return "" if label is None or error.what == "Invalid label" else label
+    label = "" if label is None or error.what == "Invalid label" else label
+    return read_line(f"{label} {stands}".strip(), number)

@@ -53,10 +53,10 @@ class _Operator:
 
     def execute(self, command: Command | None, now: float) -> Receipt | None:
         """Let the operator's site carry out a command, and record what the virtual robot accepts."""
-        site = self.session.operator
+        virtual = self.session.operator.robot
         if command is None:
-            return site.robot.undo(now=now)
-        answer = site.robot.execute(command, now=now)
+            return virtual.undo(now=now)
+        answer = virtual.execute(command, now=now)
         assert isinstance(answer, Receipt)
         if answer.status is not Status.REJECTED:
             assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))

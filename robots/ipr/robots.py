@@ -6,17 +6,19 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-from robots.ipr import chassis
-from robots.ipr.body import MobileBody
+from robots.ipr import parameters
 from robots.ipr.model import Kind, model
-from robots.ipr.robot import BareBody
-from robots.ipr.shapes import SCREEN_SIZE, ipr_shapes, links, micro_shapes, screen_pose
+from robots.ipr.shapes import NECK, REACH, SCREEN_SIZE, headless, ipr_shapes, micro_shapes, screen_pose
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import Chassis
+from robots.mobile.robot import BareBody
+from robots.mobile.shapes import links
 from robots.onboard.laser import LaserModel
 from robots.robot import Appearance, Display, HeadCamera, Robot
 from robots.solids import LinkShape
 
 
-def _robot(kind: Kind, body: chassis.Chassis, shapes: Callable[[], Sequence[LinkShape]], *devices: object) -> Robot:
+def _robot(kind: Kind, body: Chassis, shapes: Callable[[], Sequence[LinkShape]], *devices: object) -> Robot:
     bodies: dict[str, Callable[..., Any]] = {
         "bullet": partial(MobileBody, body),
         "bare": partial(BareBody, body),
@@ -25,8 +27,13 @@ def _robot(kind: Kind, body: chassis.Chassis, shapes: Callable[[], Sequence[Link
 
 
 ROBOT: Final = _robot(
-    Kind.IPR, chassis.IPR, ipr_shapes, Display(SCREEN_SIZE, screen_pose), HeadCamera(), LaserModel()
+    Kind.IPR,
+    parameters.IPR,
+    ipr_shapes,
+    Display(SCREEN_SIZE, screen_pose),
+    HeadCamera(NECK, REACH, headless),
+    LaserModel(),
 )
 """The 75 kg robot of section 2.1, with a display and a camera in its head."""
-MICRO: Final = _robot(Kind.MICRO, chassis.MICRO, micro_shapes, LaserModel(forward=0.0, height=0.06))
+MICRO: Final = _robot(Kind.MICRO, parameters.MICRO, micro_shapes, LaserModel(forward=0.0, height=0.06))
 """The 430 g robot of section 4.2; a laser scanner would sit on its middle."""

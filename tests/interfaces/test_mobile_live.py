@@ -40,7 +40,7 @@ from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.following_base import DrivenConfig
 from robots import load
 from robots.bullet.rooms import EMPTY
-from robots.ipr.robot import place
+from robots.mobile.robot import place
 from robots.onboard.journey import Goal, JourneyState
 from robots.robot import IDEAL
 from tests.contract import doors

@@ -23,7 +23,7 @@ from interfaces.stream.access import Access
 from interfaces.teleop import RobotSiteConfig
 from interfaces.teleop.following_base import DrivenConfig
 from robots import load, onboard
-from robots.ipr.robot import place
+from robots.mobile.robot import place
 from robots.onboard import WatchdogConfig
 from tests.interfaces.live_rig import HALT, MODEL, NOMINAL, operator_here, robot_here, until
 

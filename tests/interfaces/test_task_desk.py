@@ -45,7 +45,7 @@ class Office:
         self.desk = TaskDesk(self.rig.operator, ROOM, MODEL, self.told.append, file)
 
     def run(self, seconds: float) -> None:
-        self.rig.run(seconds, lambda now: self.desk.turn(now=now))
+        self.rig.run(seconds, lambda _: self.desk.turn())
 
     def order(self, task: RobotTask) -> str:
         return self.desk.order(task)
@@ -75,7 +75,7 @@ def test_a_list_is_done_and_saved_at_each_step(tmp_path: Path) -> None:
     office.run(1.5)
     assert office.desk.progress.jobs[1].stage is JobStage.RUNNING
     assert JobFile(path).load()[1] == office.desk.progress
-    assert "pause or abort" in office.order(RobotTask(jobs=JOBS.removed(3)))
+    assert "pause or abort" in office.order(RobotTask(jobs=JobList(JOBS.jobs[:2], JOBS.places)))
     assert "being done" in office.order(RobotTask(do=ListCommand.RUN))
     office.run(20.0)
     assert office.tasks.doing is Doing.JOBS

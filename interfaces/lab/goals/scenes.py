@@ -12,10 +12,10 @@ import numpy as np
 
 from interfaces.lab.goals.trial import TripSetting, seen_all
 from robots.bullet.rooms import Room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.navigation import route_map
-from robots.ipr.robot import place
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.navigation import route_map
+from robots.mobile.robot import place
 from robots.onboard.journey import Goal
 from robots.onboard.routes import Route, RouteMap
 from robots.robot import USUAL_BASE, load

@@ -28,7 +28,7 @@ from interfaces.lab.goals.trial import Trip, seen_all, travel
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, to_json, write_files
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.bullet.rooms import Block, Column, Room
-from robots.ipr.navigation import route_config
+from robots.mobile.navigation import route_config
 from robots.onboard.journey import JourneyState
 from robots.onboard.routes import RouteProblem
 from robots.robot import USUAL_BASE, load

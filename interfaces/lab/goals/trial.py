@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.navigation import BodyNavigator, route_map
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import Collision, MobileRobot
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.navigation import BodyNavigator, route_map
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import Collision, MobileRobot
 from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel

@@ -23,9 +23,10 @@ from interfaces.lab.output import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.statistics import bootstrap
 from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.bullet.rooms import Person, Room
-from robots.ipr.body import Cargo
-from robots.ipr.chassis import IPR, Senses
-from robots.ipr.robot import place
+from robots.ipr.parameters import IPR
+from robots.mobile.body import Cargo
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import place
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
 from vrs.mobile import wrapped
@@ -33,7 +34,7 @@ from vrs.mobile import wrapped
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
-    from robots.ipr.body import MobileBody
+    from robots.mobile.body import MobileBody
 
 HELLO: Final = "Hello!"
 """What is said at B."""
@@ -76,7 +77,7 @@ def play(seed: int) -> Results:
     Args:
         seed: Of the robot's noise and slip, and of when and how fast somebody walks by.
     """
-    from robots.ipr.body import MobileBody
+    from robots.mobile.body import MobileBody
 
     room = home(np.random.default_rng([seed, 1]))
     senses = Senses(camera=None, laser=LaserModel())

@@ -23,9 +23,9 @@ from interfaces.link.link import Link
 from interfaces.link.losses import loss_model
 from interfaces.rsp.model import RobotModel, read_model
 from robots.cubo import parameters as p
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.position import FusedPosition
-from robots.ipr.robot import BareBody, MobileRobot
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.position import FusedPosition
+from robots.mobile.robot import BareBody, MobileRobot
 from robots.onboard.driving import Posture
 from vrs.checks import one_of, validated, within
 from vrs.comparison import match_paths

@@ -26,7 +26,7 @@ from interfaces.lab.localization.trial import (
 )
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw
 from robots.bullet.rooms import Room
-from robots.ipr.floor_plan import plan_map
+from robots.mobile.floor_plan import plan_map
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer

@@ -13,8 +13,8 @@ import numpy as np
 from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Results, Study, Table, at_least, at_most
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.floor_plan import FloorPlan, Ways, plan_map
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer, Status
 from vrs.mobile import wrapped

@@ -23,7 +23,7 @@ from interfaces.lab.localization.searching import (
 from interfaces.lab.localization.trial import body_of, drive, setting
 from interfaces.lab.output import to_json, write_files
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.floor_plan import plan_map
+from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer
 from vrs.checks import number_in

@@ -10,10 +10,10 @@ from typing import TypeAlias
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.floor_plan import Ways
-from robots.ipr.robot import MobileRobot
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import Ways
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Drive
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserModel, LaserScan

@@ -109,8 +109,8 @@ class BaseTwins(LiveTwins[VirtualBase]):
         room = self._place
         return None if room is EMPTY else operator_surroundings(room, start, self._model)
 
-    def reality(self, now: float) -> tuple[tuple[float, float, float], float] | None:
-        """Where the real robot is, and the time in its room, as far as is known; None before its first report.
+    def stand(self, now: float) -> tuple[tuple[float, float, float], float]:
+        """Where the real robot is, and the time in its room; where it begins before it's been heard.
 
         Args:
             now: Session time [s].
@@ -120,14 +120,9 @@ class BaseTwins(LiveTwins[VirtualBase]):
         """
         operator, report = self.operator, self.operator.report
         if report is None:
-            return None
+            return self._place.start, 0.0
         posture = advanced(report.posture, *report.drive, min(now - operator.heard, SMOOTHED))
-        world = 0.0 if report.world is None else report.world + max(0.0, now - report.measured_at)
-        return posture, world
-
-    def stand(self, now: float) -> tuple[tuple[float, float, float], float]:
-        """The same, from the beginning on: where it begins before it's been heard."""
-        return self.reality(now) or (self._place.start, 0.0)
+        return posture, 0.0 if report.world is None else report.world + max(0.0, now - report.measured_at)
 
     @property
     @override
@@ -142,6 +137,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
     @override
     def state(self, number: int, *, connected: bool, now: float) -> Postures:
         operator, virtual, report = self.operator, self.operator.robot, self.operator.report
+        driven, drawn = virtual.virtual(now), Posture(*virtual.shown(now=now).tolist())
         real: dict[str, Any] = {}
         if report is not None:
             real = {"t": report.measured_at, "real": report.posture, "drive": report.drive, "D": report.D}
@@ -152,7 +148,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
         return Postures(
             number=number,
             now=now,
-            virtual=virtual.virtual(now),
+            virtual=driven,
             command=virtual.architecture.before,
             estimate=Posture(*virtual.architecture.estimator.posture.tolist()),
             connected=connected,
@@ -160,6 +156,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
             drives=virtual.epochs,
             round_trip=operator.round_trip,
             messages=self.line.messages()[-MOST_MESSAGES:],
+            drawn=None if drawn == driven else drawn,
             **real,
         )
 
@@ -175,14 +172,14 @@ class BaseTwins(LiveTwins[VirtualBase]):
 
     @override
     def draw(self, attached: Attached | None, *, now: float) -> None:
+        self.operator.robot.estimating = attached is not None and attached.architecture in ESTIMATING
         self._follow()
         if not self.scene.readers:
             return
         operator, virtual = self.operator, self.operator.robot
-        virtual.estimating = attached is not None and attached.architecture in ESTIMATING
-        known = self.reality(now)
-        if known is not None:
-            self._measure(known[0])
+        posture, t = self.stand(now)
+        if operator.report is not None:
+            self._measure(posture)
         committed = self._to_goal()
         if not operator.halted and virtual.deviation is not None:
             committed = Committed(self._to_rest(), virtual.path.place)
@@ -193,7 +190,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
             path=committed,
             driven={twin: np.array(way.places).reshape(-1, 2) for twin, way in self._ways.items()},
             learned=() if around is None else around.environment.obstacles(virtual.next_t),
-            t=0.0 if known is None else known[1],
+            t=t,
             now=now,
         )
 

@@ -29,16 +29,8 @@ class OperatorDevice:
         """What runs as long as the site does."""
         return nullcontext()
 
-    def turn(self, *, now: float) -> None:
-        """Take in what is new at session time now [s], whenever the site has its turn."""
-
-    @property
-    def carries_on(self) -> bool:
-        """Whether the real robot goes on with what it does by itself where nobody has control."""
-        return False
-
-    def rerouted(self, now: float, text: str) -> None:
-        """Hear that the emulated way to the robot has changed at session time now [s], and how, for people."""
+    def turn(self) -> None:
+        """Take in what is new, whenever the site has its turn."""
 
     def health(self) -> Any:
         """How it is, for `/health`; None where it isn't there."""
@@ -77,7 +69,7 @@ class MediaDevice(OperatorDevice):
         return nullcontext() if self.media is None else self.media.running()
 
     @override
-    def turn(self, *, now: float) -> None:
+    def turn(self) -> None:
         tasks = self._twins.operator.robot.tasks
         if self.media is not None and tasks is not None:
             self.media.presenter.follow(tasks.says, tasks.shows)

@@ -179,7 +179,7 @@ class LiveOperator(LeasedRobot, Workers):
             self._wants_resume = bool(operator.halted and operator.resume(now=now))
         self._end_lease(now)
         for device in self.devices:
-            device.turn(now=now)
+            device.turn()
         if self._tell(now) or operator.robot.engine.timeline.version != version:
             self.server.kick()
         return self.line.next_deadline()
@@ -214,7 +214,7 @@ class LiveOperator(LeasedRobot, Workers):
 
     @property
     def _carries_on(self) -> bool:
-        return any(device.carries_on for device in self.devices)
+        return self.desk is not None and self.desk.carries_on
 
     def _end_lease(self, now: float) -> None:
         """Let the next one have the lease once both robots rest."""
@@ -248,8 +248,8 @@ class LiveOperator(LeasedRobot, Workers):
 
     def _rerouted(self, now: float, text: str) -> None:
         """The emulated way to the robot has changed."""
-        for device in self.devices:
-            device.rerouted(now, text)
+        if self.recording is not None:
+            self.recording.rerouted(now, text)
         self._turning.soon()
 
     def lose(self, reason: str) -> None:

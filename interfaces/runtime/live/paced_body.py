@@ -25,8 +25,8 @@ from interfaces.teleop.autonomy import Autonomy, Hands, LaserSight, NavigatorPil
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Senses
-from robots.ipr.robot import MobileRobot
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import MobileRobot
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.following import SoundPosition

@@ -113,8 +113,8 @@ class SiteRecording(OperatorDevice):
             await asyncio.sleep(TURN)
             recorder.advance(now=self._clock.now(), connected=self._connected())
 
-    @override
     def rerouted(self, now: float, text: str) -> None:
+        """Write down that the emulated way to the robot has changed at session time now [s], and how."""
         if self.recorder is not None:
             self.recorder.tell(now, "rerouted", text)
 

@@ -35,7 +35,7 @@ from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
 from robots.bullet.rooms import Room
-from robots.ipr.navigation import outline_of, route_map
+from robots.mobile.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteMap
@@ -94,7 +94,7 @@ class TaskDesk(OperatorDevice):
         self._sight: SensedPoints | None = None
         self._told = Tasks()
         self._tell(self.plan())
-        self._tell_tasks()
+        self.turn()
 
     def _loaded(self) -> tuple[JobList, Progress]:
         if self._file is None:
@@ -130,7 +130,7 @@ class TaskDesk(OperatorDevice):
             return TOO_LONG
         self.jobs, self.progress, self._digest, self._forecast = jobs, progress, digest(jobs), None
         self._keep()
-        self._tell_tasks()
+        self.turn()
         return ""
 
     def _command(self, task: RobotTask, command: ListCommand) -> str:
@@ -161,7 +161,7 @@ class TaskDesk(OperatorDevice):
         forecast = await asyncio.to_thread(self._forecast_of, jobs, report.posture)
         if jobs == self.jobs:
             self._forecast = forecast
-            self._tell_tasks()
+            self.turn()
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
         if self._roads is None:
@@ -173,10 +173,7 @@ class TaskDesk(OperatorDevice):
         return self._operator.robot.doing
 
     @override
-    def turn(self, *, now: float) -> None:
-        self._tell_tasks()
-
-    def _tell_tasks(self) -> None:
+    def turn(self) -> None:
         """Take in what the robot has said, and tell everybody what is new."""
         report, sight = self._operator.robot.tasks, self._operator.robot.sight
         if report is not None and report is not self._report:
@@ -205,8 +202,8 @@ class TaskDesk(OperatorDevice):
         return Tasks(self._doing, *way, *listed, loss, report.shows, report.says, self.problem, answers)
 
     @property
-    @override
     def carries_on(self) -> bool:
+        """Whether the real robot goes on with what it does by itself where nobody has control."""
         tasks = self._operator.robot.tasks
         return self._doing is not Doing.NOTHING and tasks is not None and tasks.loss is OperatorLoss.CARRY_ON
 

@@ -15,9 +15,9 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from interfaces.stream import server
 from interfaces.stream.meshcat.meshes import viewer_bundle
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.server import KeptFile
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError
 
@@ -226,14 +226,11 @@ def token_in(text: str) -> str | None:
     return token if isinstance(token, str) else None
 
 
-HEADERS: Final = {
+HEADERS: Final = server.HEADERS | {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cache-Control": "no-cache",
+    )
 }
 PARTS: Final = ("meshcat.js", "scene.js", "licences.txt")
 """What every page with a 3D view needs."""
@@ -280,9 +277,9 @@ def _answer(request: Request, known: dict[str, str], name: str) -> Response:
 
 
 @lru_cache(maxsize=16)
-def _file(package: str, name: str) -> KeptFile:
+def _file(package: str, name: str) -> server.KeptFile:
     if name in ("meshcat.js", "licences.txt"):
         content = viewer_bundle()[name == "licences.txt"].encode()
     else:
         content = resources.files(package).joinpath(f"static/{name}").read_bytes()
-    return KeptFile.of(content)
+    return server.KeptFile.of(content)

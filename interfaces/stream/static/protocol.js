@@ -433,6 +433,7 @@ function checkPostures(m) {
   m.drives = m.drives === undefined ? 0 : whole(m.drives, 0, WHOLE, "postures.drives"); // How often the virtual robot was put where the real one stood: a drive begins with each lease and `Resume`, and after a stop.
   m.round_trip = m.round_trip === undefined || m.round_trip === null ? null : real(m.round_trip, -1e9, 1e9, "postures.round_trip"); // As in `state`.
   m.messages = m.messages === undefined ? [] : list(m.messages, 0, 64, "postures.messages", (x) => tuple(x, "postures.messages", (x) => real(x, -1e9, 1e9, "postures.messages"), (x) => x === null ? x : real(x, -1e9, 1e9, "postures.messages"))); // As in `state`.
+  m.drawn = m.drawn === undefined || m.drawn === null ? null : checkPosture(m.drawn); // Where the virtual robot is drawn, where the posture estimator has it now; absent where that's `virtual`, as in architectures without one.
   return m;
 }
 

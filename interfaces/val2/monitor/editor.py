@@ -12,7 +12,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.locations import following
 from interfaces.val2.monitor.state import Dialogue, Expects, Question, Style, TerminalState, integer, named, pieces
-from interfaces.val2.parser import parse_line, parse_program
+from interfaces.val2.parser import parse_header, parse_line
 from interfaces.val2.printer import print_program, print_step
 from interfaces.val2.structure import structure
 from interfaces.val2.syntax import BLANK, Instruction, Program, Step, Variable
@@ -164,7 +164,7 @@ def edit(state: TerminalState, rest: str) -> Dialogue:
     given, *step = pieces(rest or state.last_edit) or [""]
     if len(step) > 1:
         raise ValError("Invalid argument", f"{rest}: a program and a step")
-    head = parse_program(f".PROGRAM {given}\n.END") if "(" in given else Program(named(given, "program"))
+    head = parse_header(f".PROGRAM {given}") if "(" in given else Program(named(given, "program"))
     name, programs = head.name, state.controller.memory.programs
     state.refuse_in_use(name)
     known = programs.get(name)

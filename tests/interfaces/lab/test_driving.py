@@ -17,8 +17,9 @@ from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import CAUSES, attributed, cases, grouped, measure, paired, sweep
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
-from robots.ipr.chassis import IPR, MobileReality
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import BareBody, place
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import advanced

@@ -29,9 +29,9 @@ from interfaces.lab.goals.study import (
 )
 from interfaces.lab.goals.trial import Trip, TripSetting
 from robots.bullet.rooms import Block, Room
-from robots.ipr.chassis import IPR
-from robots.ipr.navigation import route_map
-from robots.ipr.robot import Collision
+from robots.ipr.parameters import IPR
+from robots.mobile.navigation import route_map
+from robots.mobile.robot import Collision
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.routes import Route, RouteProblem
 from vrs.errors import InvalidValueError

@@ -22,9 +22,9 @@ from interfaces.lab.kim2002.scenario import (
 from interfaces.lab.papers import papers
 from interfaces.messages.jobs import JobStage
 from robots.bullet.rooms import Person
-from robots.ipr.body import Cargo, MobileBody
-from robots.ipr.chassis import IPR
-from robots.ipr.robot import Collision, place
+from robots.ipr.parameters import IPR
+from robots.mobile.body import Cargo, MobileBody
+from robots.mobile.robot import Collision, place
 from vrs.errors import InvalidValueError
 
 

@@ -17,9 +17,9 @@ from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots import ipr
-from robots.ipr.chassis import IPR
-from robots.ipr.position import FusedPosition
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.position import FusedPosition
+from robots.mobile.robot import BareBody
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.journey import Journey

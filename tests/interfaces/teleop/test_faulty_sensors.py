@@ -16,8 +16,9 @@ from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import load
-from robots.ipr.chassis import IPR, Senses
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import BareBody, place
 from robots.onboard.driving import Posture
 from robots.onboard.following import SensorWatch, SoundPosition
 from robots.onboard.laser import LaserModel

@@ -6,8 +6,9 @@ import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.editor import HELP, Editor
-from interfaces.val2.parser import parse_line, parse_program
+from interfaces.val2.parser import parse_line
 from interfaces.val2.printer import print_step
+from interfaces.val2.source import parse_program
 from interfaces.val2.syntax import Program, Variable
 
 from .sitting import Sitting

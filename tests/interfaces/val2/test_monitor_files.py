@@ -165,3 +165,39 @@ def test_many_values_arent_loaded_while_a_program_runs(sitting, tmp_path):
 def test_a_file_that_is_too_long_is_refused(sitting, tmp_path):
     (tmp_path / "big.v2").write_text(";" * 4_000_001)
     assert sitting.type("LOAD big") == "*File error* big.v2: longer than 4000000 bytes\n"
+
+
+def test_a_file_with_unknown_instructions_is_loaded_and_all_of_them_are_named(sitting, tmp_path):
+    text = ".PROGRAM odd\n TYPE 1\n IF FALSE THEN\n FROBNICATE 3, x ;why\n END\n MVOE p\n.END\n"
+    (tmp_path / "odd.v2").write_text(text)
+    said = sitting.type("LOAD odd").splitlines()
+    assert said[0] == "odd.v2: 1 program"
+    assert said[1:] == [
+        "*Undefined instruction* FROBNICATE, program odd, step 3, column 2",
+        "*Undefined instruction* MVOE; did you mean MOVE?, program odd, step 5, column 2",
+    ]
+    assert "    FROBNICATE 3, x ;why\n" in sitting.type("LISTP odd")
+    said = sitting.type("EXECUTE odd")
+    assert "*Undefined instruction* MVOE; did you mean MOVE?, program odd, step 5" in said
+    assert "FROBNICATE" not in said
+
+
+def test_files_are_deleted_and_renamed_and_asked_for_first(sitting, tmp_path):
+    sitting.type(*HELLO, "STORE a", "STORE b")
+    sitting.line("FDELETE a")
+    assert sitting.monitor.prompt == "Delete a.v2 (Y/N)? "
+    sitting.type("N", "FRENAME c=a")
+    assert sorted(path.name for path in tmp_path.glob("*.v2")) == ["b.v2", "c.v2"]
+    sitting.line("FRENAME b=c")
+    assert sitting.monitor.prompt == "b.v2 exists. Replace it (Y/N)? "
+    sitting.type("", "FDELETE c", "Y", "FRENAME d=b")
+    assert [path.name for path in tmp_path.glob("*.v2")] == ["d.v2"]
+    assert sitting.monitor.suggestions("FRENAME e=")[1][0].word == "d"
+    assert sitting.monitor.suggestions("FDELETE ")[1][0].word == "d"
+    for line, wrong in (
+        ("FDELETE", "*Missing argument* a file's name"), ("FDELETE e", "*Nonexistent file* e.v2"),
+        ("FDELETE ../d", "*Invalid file name* ../d"), ("FRENAME e", "*Missing argument* FRENAME new=old"),
+        ("FRENAME e=f", "*Nonexistent file* f.v2"), ("FRENAME ../e=d", "*Invalid file name* ../e"),
+    ):  # fmt: skip
+        assert sitting.type(line).startswith(wrong), line
+    assert "Rename a file" in sitting.type("HELP FRENAME")

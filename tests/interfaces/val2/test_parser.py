@@ -11,9 +11,9 @@ import pytest
 
 from interfaces.val2 import forms
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.parser import LONGEST_LINE, cached_step, parse_expression, parse_line, parse_program
+from interfaces.val2.parser import LONGEST_LINE, cached_step, parse_expression, parse_line
 from interfaces.val2.printer import print_step
-from interfaces.val2.source import parse_file
+from interfaces.val2.source import parse_file, parse_program
 from interfaces.val2.structure import survey
 from interfaces.val2.syntax import (
     BLANK,
@@ -218,7 +218,7 @@ def test_words_are_keywords_only_where_they_can_stand():
         ("ELSEIF x", 1, "ELSE on a line"),
         ("BREAK 3", 7, "*Too many arguments* allowed: BREAK"),
         ("RETURN x", 8, "*Too many arguments* allowed: RETURN"),
-        ("CALL 3", 6, "allowed: a name"),
+        ("CALL 3", 6, "allowed: the name of a program"),
         ("CALL #p", 6, "the name of a program"),
         ("REACT 1001, $x", 13, "the name of a program"),
         ('PROMPT "x", 3', 13, "allowed: a variable"),

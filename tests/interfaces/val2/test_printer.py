@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from interfaces.val2.parser import parse_expression, parse_line, parse_program
+from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.printer import print_expression, print_program, print_step
-from interfaces.val2.source import parse_file
+from interfaces.val2.source import parse_file, parse_program
 from interfaces.val2.syntax import Text, Variable
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -155,7 +155,7 @@ def test_a_text_without_a_header_is_a_program_of_the_files_name():
         ('.STRINGS\ns "a"', (2, 1), "allowed: $name"),
         (".STRINGS\n$s 3", (2, 4), "strings and $CHR"),
         ('.STRINGS\n$s "a', (2, 4), "no closing quote"),
-        (".SIGNALS\n1001 == SIG(1)", (2, 6), "unexpected '=='; allowed: '='"),
+        (".SIGNALS\n1001 == SIG(1)", (2, 7), "allowed: a value"),
         (".SIGNALS\n1001 = SIG(1) AFTER 1 AFTER 2", (2, 23), "a second AFTER"),
         (".SIGNALS\n10.5 = TRUE", (2, 1), "Illegal digital signal"),
         (".PROGRAM a\n.END\nMOVE p", (3, 1), "allowed: .PROGRAM"),

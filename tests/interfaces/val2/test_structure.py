@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.parser import parse_program
+from interfaces.val2.source import parse_program
 from interfaces.val2.structure import StructureBlock, structure, survey
 
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from robots.ipr.chassis import IPR, MICRO, Chassis
-from robots.ipr.robot import PLACES, place
-from robots.ipr.shapes import ipr_shapes, links, micro_shapes, person_shape, room_shapes
+from robots.ipr.parameters import IPR, MICRO
+from robots.ipr.shapes import ipr_shapes, micro_shapes
+from robots.mobile.chassis import Chassis
+from robots.mobile.robot import PLACES, place
+from robots.mobile.shapes import links, person_shape, room_shapes
 from robots.solids import LinkShape
 from vrs.errors import InvalidValueError
 from vrs.model import Array

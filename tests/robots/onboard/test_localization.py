@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.chassis import IPR, MobileReality, Senses
-from robots.ipr.floor_plan import plan_map
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import plan_map
+from robots.mobile.robot import BareBody
 from robots.onboard.laser import LaserModel
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig, Tracker

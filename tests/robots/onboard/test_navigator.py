@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.chassis import IPR
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.robot import BareBody
 from robots.onboard.driving import Posture
 from robots.onboard.navigator import Navigator
 

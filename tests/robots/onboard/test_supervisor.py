@@ -9,9 +9,9 @@ import pytest
 
 from interfaces.teleop.architectures import Immediate
 from interfaces.teleop.architectures.compositions import robot_surroundings
-from robots.ipr.chassis import IPR
-from robots.ipr.position import FusedPosition
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.position import FusedPosition
+from robots.mobile.robot import BareBody, place
 from robots.onboard.avoidance import SonarMount
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.ipr.chassis import Chassis, MobileReality
+from robots.mobile.chassis import Chassis, MobileReality
 from vrs.checks import finite_array, number_in
 from vrs.mobile import DriveLimits
 

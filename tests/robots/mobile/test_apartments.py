@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.apartments import ApartmentConfig, apartment, apartment_plan
-from robots.ipr.floor_plan import FloorPlan, Ways, plan_map
-from robots.ipr.robot import PLACES, place
+from robots.mobile.apartments import ApartmentConfig, apartment, apartment_plan
+from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
+from robots.mobile.robot import PLACES, place
 from robots.onboard.gsp_map import cast_lines
 from vrs.errors import InvalidValueError
 

@@ -9,12 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.ipr.camera import NECK, REACH, Lens, Look, PanTilt, PanTiltConfig, lens_pose
-from robots.ipr.chassis import IPR
+from robots.ipr.parameters import IPR
 from robots.ipr.shapes import SCREEN_SIZE, headless, ipr_shapes, screen_pose
+from robots.mobile.camera import Lens, Look, PanTilt, PanTiltConfig, lens_pose
+from robots.robot import HeadCamera, load
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
+CAMERA = load("ipr").device(HeadCamera)
+assert CAMERA is not None
 CONFIG = PanTiltConfig()
 share = st.floats(0.0, 1.0)
 aims = st.lists(st.tuples(st.floats(0.0, 1.5), share, share), min_size=1, max_size=6)
@@ -104,19 +107,19 @@ def test_axes_keep_their_bounds(given: dict[str, float]) -> None:
 
 @given(st.floats(-1.7, 1.7), st.floats(-0.6, 0.7))
 def test_the_lens_looks_where_the_angles_say(pan: float, tilt: float) -> None:
-    X = lens_pose(Look(pan, tilt))
+    X = lens_pose(Look(pan, tilt), CAMERA)
     R = X[:3, :3]
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-12)
     assert np.linalg.det(R) == pytest.approx(1.0)
     assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(pan, abs=1e-12)
     assert math.asin(R[2, 0]) == pytest.approx(tilt, abs=1e-12)
     assert R[2, 1] == 0.0
-    assert np.linalg.norm(X[:3, 3] - NECK) == pytest.approx(REACH)
+    assert np.linalg.norm(X[:3, 3] - CAMERA.neck) == pytest.approx(CAMERA.reach)
 
 
 def test_the_lens_is_at_the_front_of_the_head_and_the_head_is_not_in_its_way() -> None:
     body, (whole, *_) = headless(), ipr_shapes()
-    ahead = lens_pose(Look(0.0, 0.0))[:3, 3]
+    ahead = lens_pose(Look(0.0, 0.0), CAMERA)[:3, 3]
     head = whole.vertices[whole.vertices[:, 2] > 0.68]
     assert ahead[0] == pytest.approx(head[:, 0].max(), abs=1e-3)
     assert head[:, 2].min() < ahead[2] < head[:, 2].max() == pytest.approx(IPR.height)

@@ -9,8 +9,8 @@ import pytest
 
 from robots.bullet.rooms import Room, read_room
 from robots.bullet.world import RoomBodies, World
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import PLACES, place
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.robot import PLACES, place
 from vrs.model import Array
 
 PLAN = read_room(

@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.floor_plan import CELL, Ways
+from robots.mobile.floor_plan import CELL, Ways
 from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 

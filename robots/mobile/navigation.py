@@ -8,7 +8,7 @@ import numpy as np
 
 from robots.base import Footprint
 from robots.bullet.rooms import Room
-from robots.ipr.robot import MobileRobot
+from robots.mobile.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoversConfig, YieldingConfig

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from robots.ipr.floor_plan import plan_map
-from robots.ipr.robot import MobileRobot
+from robots.mobile.floor_plan import plan_map
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.line_filter import MotionConfig

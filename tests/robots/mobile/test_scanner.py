@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from robots.ipr.body import MobileBody
-from robots.ipr.chassis import IPR, MobileReality, Senses
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import BareBody, MobileRobot, place
+from robots.ipr.parameters import IPR
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.robot import BareBody, MobileRobot, place
 from robots.onboard.laser import LaserModel
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from robots.bullet.rooms import Door, read_room
 from robots.bullet.world import RoomBodies, World
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import place
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.robot import place
 from vrs.errors import FormatError, InvalidValueError
 
 PLAN = """room 1

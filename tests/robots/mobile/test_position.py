@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from robots.ipr.chassis import IPR, CameraModel, MobileReality, Senses
-from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import CameraModel, MobileReality, Senses
+from robots.mobile.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
+from robots.mobile.robot import BareBody
 from vrs.errors import InvalidValueError
 
 EXACT = Senses(sonar=None, camera=CameraModel(latency=0.4, noise=0.0, noise_angle=0.0))

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.chassis import IPR, MICRO, CameraModel, Chassis, MobileReality, Senses, SonarModel
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import BareBody, MobileRobot
-from robots.ipr.sensing import SonarRing
+from robots.ipr.parameters import IPR, MICRO
+from robots.mobile.chassis import CameraModel, Chassis, MobileReality, Senses, SonarModel
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.robot import BareBody, MobileRobot
+from robots.mobile.sensing import SonarRing
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced
 from vrs.model import Array

@@ -22,8 +22,8 @@ from typing_extensions import override
 
 from robots.bullet.serial_arm import RigidLink, quaternion
 from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, LostError, RoomBodies, World
-from robots.ipr.chassis import Chassis, MobileReality
-from robots.ipr.robot import MobileRobot
+from robots.mobile.chassis import Chassis, MobileReality
+from robots.mobile.robot import MobileRobot
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.model import Array

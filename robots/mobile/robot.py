@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
+from robots.base import PERIOD
 from robots.bullet.rooms import EMPTY, Room, load_room
-from robots.ipr.chassis import Chassis, MobileReality, Senses
-from robots.ipr.drive_train import DriveTrain, Odometry, as_posture
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.model import PERIOD
-from robots.ipr.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
+from robots.mobile.chassis import Chassis, MobileReality, Senses
+from robots.mobile.drive_train import DriveTrain, Odometry, as_posture
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.following import SensorWatch
 from robots.onboard.laser import LaserScan
 from vrs.checks import finite, integer_in, one_of

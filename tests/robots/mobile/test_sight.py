@@ -12,8 +12,11 @@ import pytest
 from robots.base import upright
 from robots.bullet.rooms import EMPTY, read_room
 from robots.bullet.world import SKY, Picture
-from robots.ipr.camera import Lens, Look, Sight, lens_pose
+from robots.mobile.camera import Lens, Look, Sight, lens_pose
+from robots.robot import HeadCamera, load
 
+CAMERA = load("ipr").device(HeadCamera)
+assert CAMERA is not None
 LENS = Lens(width=240, height=180, view=math.radians(60.0))
 ROOM = read_room("""room 1
 size 10 10
@@ -27,7 +30,7 @@ AHEAD = Look(0.0, 0.0)
 
 @pytest.fixture(scope="module")
 def sight() -> Iterator[Sight]:
-    made = Sight(ROOM, LENS)
+    made = Sight(ROOM, CAMERA, LENS)
     yield made
     made.close()
 
@@ -44,7 +47,7 @@ def projected(
     posture: tuple[float, float, float], look: Look, point: tuple[float, float, float]
 ) -> tuple[float, float]:
     """Column and row at which a pinhole has a point of the world."""
-    X = upright(*posture) @ lens_pose(look)
+    X = upright(*posture) @ lens_pose(look, CAMERA)
     x, y, z = X[:3, :3].T @ (np.array(point) - X[:3, 3])
     focus = LENS.width / 2 / math.tan(LENS.view / 2)
     return LENS.width / 2 - focus * y / x, LENS.height / 2 - focus * z / x
@@ -81,7 +84,7 @@ def test_what_comes_and_goes_is_seen_while_it_stands(sight: Sight) -> None:
 
 def test_a_door_is_in_the_way_until_it_opens() -> None:
     room = read_room("room 1\nsize 6 4\nwall 3 0  3 1.5\nwall 3 2.5  3 4\ndoor 3 1.5  3 2.5 sliding 0,0 2,0 4,1\n")
-    sight = Sight(room, LENS)
+    sight = Sight(room, CAMERA, LENS)
     try:
         shut, half, wide = (sight.draw((1.0, 2.0, 0.0), AHEAD, t)[70:110, 100:140].astype(int) for t in (1, 3, 5))
     finally:
@@ -109,7 +112,7 @@ def test_its_own_display_is_in_the_way_far_down(sight: Sight) -> None:
 
 
 def test_the_floor_of_nowhere_goes_on_and_stays_where_it_is() -> None:
-    sight = Sight(EMPTY, LENS)
+    sight = Sight(EMPTY, CAMERA, LENS)
     try:
         at = [sight.draw((x, 0.0, 0.3), Look(0.0, -0.2), 0.0) for x in (0.0, 100.0, 100.25)]
     finally:
@@ -121,7 +124,7 @@ def test_the_floor_of_nowhere_goes_on_and_stays_where_it_is() -> None:
 
 def test_walls_carry_a_ceiling() -> None:
     room = read_room("room 1\nsize 4 4\nwall 0 0  4 0\nwall 4 0  4 4\nwall 4 4  0 4\nwall 0 4  0 0\n")
-    sight = Sight(room, LENS)
+    sight = Sight(room, CAMERA, LENS)
     try:
         picture = sight.draw((2.0, 2.0, 0.0), Look(0.0, 0.7), 0.0)
     finally:

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.ipr.chassis import IPR, centre_of, centre_rates
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import centre_of, centre_rates
 from vrs.mobile import advanced
 
 SPEEDS = st.floats(-1, 1)

@@ -1,4 +1,4 @@
-"""The camera in the IPR's head: two axes with limits, speeds and accelerations; where it looks from, what it sees.
+"""A camera in a robot's head: two axes with limits, speeds and accelerations; where it looks from, what it sees.
 
 Source: Kim, Han, Kim, Kim, 2002, section 2.1: one colour camera in the head, which two DC motors turn about a
 vertical and a horizontal axis; section 4.2: at most 5 pictures a second. What it doesn't say is an assumption; its
@@ -18,8 +18,8 @@ import numpy as np
 from robots.base import upright
 from robots.bullet.rooms import EMPTY, Room, is_wall
 from robots.bullet.world import Picture, Studio
-from robots.ipr.model import IPR_AXLE_OFFSET
-from robots.ipr.shapes import GROUND, box, door_shape, headless, person_shape, room_shapes
+from robots.mobile.shapes import GROUND, box, door_shape, person_shape, room_shapes
+from robots.robot import HeadCamera
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError
@@ -27,11 +27,6 @@ from vrs.insertion import piece
 from vrs.model import Array, Limits, frozen_array
 from vrs.planning import parabolic
 from vrs.timeline import Timeline
-
-NECK: Final = (-IPR_AXLE_OFFSET - 0.03, 0.0, 0.712)
-"""Where the axes cross, in the robot's frame [m]: the middle of the head that `robots.ipr.shapes` draws."""
-REACH: Final = 0.066
-"""How far the lens is before that [m]: as far as the head's glass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,13 +139,13 @@ class PanTilt:
         return now < self._motion.end
 
 
-def lens_pose(look: Look) -> Array:
-    """Pose of the lens in the robot's frame, (4, 4): x along the line of sight, y to the left, z up."""
+def lens_pose(look: Look, camera: HeadCamera) -> Array:
+    """Pose of a camera's lens in the robot's frame, (4, 4): x along the line of sight, y to the left, z up."""
     c, s = math.cos(look.pan), math.sin(look.pan)
     u, v = math.cos(look.tilt), math.sin(look.tilt)
     X = np.eye(4)
     X[:3, :3] = [[c * u, -s, -c * v], [s * u, c, -s * v], [v, 0.0, u]]
-    X[:3, 3] = np.array(NECK) + REACH * X[:3, 0]
+    X[:3, 3] = np.array(camera.neck) + camera.reach * X[:3, 0]
     return frozen_array(X)
 
 
@@ -167,15 +162,16 @@ _MOST_TILES: Final = 4000
 class Sight:
     """Draws a room as the robot's camera sees it; `close` it in the end."""
 
-    def __init__(self, room: Room, lens: Lens | None = None) -> None:
+    def __init__(self, room: Room, camera: HeadCamera, lens: Lens | None = None) -> None:
         """Build the room once.
 
         Args:
             room: Where the robot is.
-            lens: Of the camera.
+            camera: Where it sits on the robot.
+            lens: What it sees of what is before it.
         """
         self.lens = Lens() if lens is None else lens
-        self._room, self._studio = room, Studio()
+        self._room, self._camera, self._studio = room, camera, Studio()
         self._endless = room == EMPTY
         if self._endless:
             self._floor = self._tile((-_AROUND, -_AROUND), (_AROUND, _AROUND), TILE)
@@ -187,7 +183,7 @@ class Sight:
         self._things = [(add(shape), thing) for shape, thing in zip(things, room.things, strict=True)]
         self._doors = [(add(door_shape(door)), door) for door in room.doors]
         self._people = [(add(person_shape(person)), person) for person in room.people]
-        self._body = add(headless())
+        self._body = add(camera.body())
 
     def close(self) -> None:
         """Let the renderer go; a second call does nothing."""
@@ -217,7 +213,7 @@ class Sight:
         place(self._body, X_WR)
         lens = self.lens
         return self._studio.draw(
-            _lens_in_world(X_WR, look),
+            X_WR @ lens_pose(look, self._camera),
             width=lens.width,
             height=lens.height,
             view=lens.view,
@@ -255,8 +251,3 @@ def _tile_side(room: Room) -> float:
     while room.length * room.width > _MOST_TILES * side * side:
         side *= 2.0
     return side
-
-
-def _lens_in_world(X_WR: Array, look: Look) -> Array:
-    X: Array = X_WR @ lens_pose(look)
-    return X

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.ipr.chassis import CameraModel, Chassis, SonarModel
-from robots.ipr.drive_train import standard_normals
+from robots.mobile.chassis import CameraModel, Chassis, SonarModel
+from robots.mobile.drive_train import standard_normals
 from robots.onboard.laser import LaserModel, LaserScan
 from vrs.model import Array, frozen_array
 

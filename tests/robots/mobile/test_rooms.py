@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.bullet.rooms import MOST_THINGS, Person, load_room, read_room
-from robots.ipr.robot import PLACES, place
+from robots.mobile.robot import PLACES, place
 from vrs.errors import FormatError, InvalidValueError
 
 PLAN = """room 1
