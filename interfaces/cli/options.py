@@ -149,7 +149,7 @@ def val_robot(name: str) -> Robot:
     return robot
 
 
-OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose", "record", "recordings")
+OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose")
 """Options that arms alone have, by their names without dashes."""
 OF_VAL: Final = ("val-port", "val-files")
 """The same of robots that VAL-II has places for."""

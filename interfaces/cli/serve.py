@@ -210,13 +210,14 @@ def serve(
         "--robot", name, "--offset", behind, "--max-age", f"{max_age:g}", "--body", body, "--room", room,
         "--architecture", architecture, "--operator-loss", operator_loss,
     ]  # fmt: skip
-    options += [] if record is None else ["--reports", f"{RATE:g}"]
+    if record is not None and not robot.is_base:
+        options += ["--reports", f"{RATE:g}"]
     access = access_for(host, token_file, free=OPEN)
     val = _Val(val_port, val_files) if speaks_val(robot) else None
     eye = camera if robot.device(HeadCamera) else 0.0
     serving = _Serving(
         robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye, val,
-        record, recordings, behind,
+        record, recordings, behind, architecture,
     )  # fmt: skip
     uvloop.run(_serve(serving, access))
 
@@ -263,6 +264,8 @@ class _Serving:
     """Where the station records to."""
     offset: str
     """Of the robot that is started: how far it plays behind."""
+    architecture: str
+    """Of a mobile robot that is started: what it does with the operator's path."""
 
     def recording(self, path: Path, *, over: bool = True) -> LiveRecording:
         """What is recorded into a file, which may be written over."""
@@ -275,6 +278,9 @@ class _Serving:
             link_loss=OWN if self.link_loss is None else self.link_loss.value,
             failed=lambda problem: typer.echo(f"vrs: {problem}", err=True),
             over=over,
+            robot=self.robot.name,
+            room=self.room,
+            architecture=self.architecture if self.robot_at is None else OWN,
         )
 
 
@@ -316,13 +322,10 @@ async def _serve(serving: _Serving, access: Access) -> None:
         operator = _operator(serving, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
         station = _station(serving)
-        routes = [*operator.routes]
-        parts: list[AbstractAsyncContextManager[object]] = [operator.running()]
-        if operator.recording is not None:
-            shelf, what = Shelf(serving.recordings, served), partial(serving.recording, over=False)
-            recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
-            routes += recordings.routes
-            parts.append(recordings.running())
+        shelf, what = Shelf(serving.recordings, served), partial(serving.recording, over=False)
+        recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
+        routes = [*operator.routes, *recordings.routes]
+        parts: list[AbstractAsyncContextManager[object]] = [operator.running(), recordings.running()]
         if val is not None:
             assert isinstance(operator.twins, ArmTwins)
             client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
@@ -380,7 +383,7 @@ def _station(serving: _Serving) -> Station:
     from interfaces.station.panels import Offer, panels_of
 
     robot = serving.robot
-    offers = {Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS, Offer.RECORDINGS}
+    offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
     offers |= {Offer.CAMERA} if serving.camera else set()
     offers |= {Offer.TERMINALS} if serving.val is not None else set()
     return Station(described(robot), panels_of(offers))

@@ -94,9 +94,10 @@ class Capture(SiteObserver[Report, Timeline]):
         step: float,
         every: bool,
         most_before: int = MOST_BEFORE,
-        apart: bool = False,
     ) -> None:
-        """Begin with a site, at its start or in the middle; who makes this lets it listen to the site.
+        """Begin with a site, at its start or in the middle.
+
+        Who makes this lets it listen to the site, and writes what `first` gives before anything else.
 
         Args:
             engine: The site's.
@@ -104,7 +105,6 @@ class Capture(SiteObserver[Report, Timeline]):
             step: Between two samples of the virtual robot [s].
             every: Whether receipts name every command that they shifted or superseded, however many.
             most_before: See `MOST_BEFORE`.
-            apart: Whether somebody else writes what `first` gives, before anything else.
         """
         self.engine, self.model, self.step, self._every = engine, engine.model, step, every
         self.kind = MOBILE if isinstance(engine, MobileEngine) else ARM
@@ -128,8 +128,6 @@ class Capture(SiteObserver[Report, Timeline]):
         self.late = None if fresh or self.kind is MOBILE else engine.standing()
         """How an arm's engine stood; None where nothing had happened yet."""
         self._began = timeline, now
-        for message in () if apart else self.first():
-            self.add(now, message)
 
     def first(self) -> Iterator[Message]:
         """What a recording begins with: the timeline so far, and commands that aren't over. From any thread."""

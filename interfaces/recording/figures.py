@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import override
 
 from interfaces.messages.recording import (
     COLLISION,
@@ -58,18 +58,8 @@ def matchable(postures: Array) -> bool:
     return bool(steps.sum() <= FARTHEST)
 
 
-class Follower(Protocol):
-    """Says of a real robot how it follows the virtual one."""
-
-    def play(self, t: float) -> float | None:
-        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
-
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
-
-
-class Pursuit(Follower):
-    """A recording's match, made when it's first asked for."""
+class Pursuit:
+    """How a real robot follows a virtual one's path: a recording's match, made when it's first asked for."""
 
     def __init__(self, recording: Recording) -> None:
         """Take a recording."""
@@ -121,8 +111,7 @@ class Pursuit(Follower):
         left = self._moments[before] + max(float(share), 0.0) * (self._moments[after] - self._moments[before])
         return min(t, float(left))
 
-    @override
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
+    def error(self, t: float, _q_real: Array, _play: float) -> float | None:
         """How far the real robot is beside the virtual one's path at a time [m]."""
         self.prepare()
         return None if self._match is None else float(np.interp(t, *self._beside))
@@ -186,7 +175,7 @@ class _Figures:
             raise self._fail(f"holds no two samples of the real robot within {GAP} s")
         return np.maximum.accumulate(play), q, reference
 
-    def _shown(self, again: Rerun, until: float) -> tuple[AnyTimeline, ...]:
+    def _shown(self, again: Rerun, until: float) -> Sequence[AnyTimeline]:
         """The virtual robot's timelines: as the commands make them, which is exact, or by its recorded edits."""
         recording = self.recording
         if not again.missing and not again.difference:

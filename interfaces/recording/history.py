@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -242,12 +244,14 @@ def sampled(drives: Sequence[AnyTimeline], t: ArrayLike) -> Array:
     """
     if len(drives) == 1:
         return drives[0].sample(t)
-    moments = np.atleast_1d(t)
+    moments = np.asarray(t)
+    if not moments.ndim:
+        return drives[max(bisect_right(drives, float(moments), key=attrgetter("start")) - 1, 0)].sample(t)
     found: Array = np.empty((len(moments), len(drives[0].initial)))
     which = np.searchsorted([drive.start for drive in drives[1:]], moments, side="right")
     for index in np.unique(which).tolist():
         found[which == index] = drives[index].sample(moments[which == index])
-    return found if np.ndim(t) else found[0]
+    return found
 
 
 def whole(entry: HistoryEntry, parts: Sequence[Any]) -> AnyTimeline:

@@ -107,7 +107,7 @@ class LiveRecorder(Capture):
         drives = LiveDrives(line.operator, what.room, now=now) if isinstance(robot, VirtualBase) else None
         engine = robot.engine
         step = 1.0 / RATE if drives is None else CONTROL
-        super().__init__(engine, now=now, step=step, every=False, apart=True)
+        super().__init__(engine, now=now, step=step, every=False)
         self._site.listener = self
         self.path, self.since = what.path, now
         self._what, self._link, self._drives = what, line.link, drives

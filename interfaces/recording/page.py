@@ -100,7 +100,7 @@ class ReplayPage:
         self.viewers = tuple(Viewers(scene, authorize) for scene in self.scenes)
         """Of each scene."""
         board_viewers = Viewers(self.board, authorize, hear=self.hear, most_heard=MOST_HEARD)
-        self._routes: list[BaseRoute] = [
+        self.routes: list[BaseRoute] = [
             Route("/", _to_page),
             *page_files(),
             WebSocketRoute("/replay/board", board_viewers.serve),
@@ -109,11 +109,7 @@ class ReplayPage:
                 for index, viewers in enumerate(self.viewers)
             ),
         ]
-
-    @property
-    def routes(self) -> list[BaseRoute]:
         """What it answers."""
-        return self._routes
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[ReplayPage]:

@@ -80,7 +80,8 @@ class Recording:
             self._blocks = Blocks(self._source)
             self.logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
             """Entries by channel."""
-            self._end: End | None = None
+            self.end: End | None = None
+            """What it was closed with; None where it's cut."""
             begin = self._session()
             if begin is None:
                 raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
@@ -111,11 +112,11 @@ class Recording:
     def _session(self) -> Begin | None:
         """Whether the recording has ended; the first beginning that's readable."""
         held = self._blocks.having(NUMBERS["/session"])
-        if held and not self._end:
+        if held and not self.end:
             ends = [entry for entry in self.logs["/session"].of(held[-1]) if isinstance(entry, End)]
             if ends:
-                self._end = ends[-1]
-                self._blocks.ended()
+                self.end = ends[-1]
+                self._blocks.complete = True
         for index in held:
             for entry in self.logs["/session"].of(index):
                 if isinstance(entry, Begin):
@@ -134,11 +135,6 @@ class Recording:
         if grown:
             self._session()
         return grown
-
-    @property
-    def end(self) -> End | None:
-        """What it was closed with; None where it's cut."""
-        return self._end
 
     @property
     def damage(self) -> Damage:
@@ -292,14 +288,14 @@ class Recording:
         return edits
 
     @property
-    def drives(self) -> tuple[AnyTimeline, ...]:
-        """The newest timeline of each drive, by their starts; of an arm there's one.
+    def drives(self) -> Sequence[AnyTimeline]:
+        """The newest timeline of each drive, by their starts; of an arm there's one. Not to be changed.
 
         Raises:
             FormatError: If none is known.
         """
         self._known()
-        return tuple(self._chain.drives)
+        return self._chain.drives
 
     def timeline_at(self, t: float) -> AnyTimeline:
         """The timeline as it was known at a user time [s]: what came later isn't in it.

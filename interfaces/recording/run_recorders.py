@@ -112,6 +112,8 @@ class RunRecorder(_FileRecorder):
         self._capture = capture = Capture(operator.robot.engine, now=0.0, step=begin.step, every=True)
         operator.listener = capture
         self._open(begin)
+        for message in capture.first():
+            capture.add(0.0, message)
         capture.put = self._put
 
     def turn(self, turn: Turn) -> None:
@@ -212,6 +214,8 @@ class DriveRecorder(_FileRecorder, Witness):
         self._noted: list[tuple[float, Message]] = []
         self._capture = Capture(site.engine, now=0.0, step=CONTROL, every=True)
         self._capture.put = self._note
+        for message in self._capture.first():
+            self._note(message, t=0.0)
         site.listener = self._capture.commanded
         self._sent: dict[Direction, list[tuple[float, int]]] = {"forward": [], "backward": []}
         self._settled: dict[Direction, list[PacketRecord]] = {"forward": [], "backward": []}

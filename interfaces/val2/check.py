@@ -15,7 +15,7 @@ from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import Closure, kind_of
 from interfaces.val2.functions import row_of
-from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.grammar import SIGNIFICANT, name_of
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
@@ -270,6 +270,9 @@ def _alike_names(text: str) -> Iterator[CheckFinding]:
 
 def _written(i: Instruction) -> Iterator[Variable]:
     """The variables that a statement may set; `$DECODE` shortens its first argument."""
+    if i.keyword in ("ATTACH", "READ"):
+        # Of a file of V+: what is read, and the file's number.
+        yield from (Variable(name_of(word)) for word in _WORD.findall(i.passed or "") if word[0] != '"')
     if i.passed is not None or i.keyword in ("AUTO", "LOCAL", "GLOBAL"):
         return
     row = STATEMENTS[i.keyword]

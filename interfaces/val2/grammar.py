@@ -111,7 +111,7 @@ def _unexpected(text: str, begin: int, start: str, line: int) -> ValError:
     from lark.exceptions import UnexpectedInput
 
     piece = _PIECE.match(text, begin)
-    if piece is None or piece[0] == ";":
+    if piece is None or piece[0] in ";#":
         what, begin = _END, len(text[:begin].rstrip())
     elif piece[0] == '"' and '"' not in text[begin + 1 :]:
         return syntax_error("the string has no closing quote", line, begin + 1)

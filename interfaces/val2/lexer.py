@@ -37,7 +37,8 @@ class Val2Lexer(RegexLexer):  # type: ignore[misc]
     tokens: ClassVar = {
         "root": [
             (r"^[ \t]*\.[A-Za-z]+(?![A-Za-z0-9_.])", Keyword.Declaration, "line"),
-            (r"^([ \t]*)([0-9]+)(?=[ \t;\r\n]|$)", bygroups(Whitespace, Name.Label)),
+            (r"^([ \t]*)([0-9]+\.\??)(?=[ \t\r\n]|$)", bygroups(Whitespace, Comment.Special)),
+            (r"([ \t]*)([0-9]+)(?=[ \t;\r\n]|$)", bygroups(Whitespace, Name.Label)),
             (r"[ \t]+", Whitespace),
             (r"\r\n|\r|\n", Whitespace),
             (r"(?i:REMARK)(?![A-Za-z0-9_.])[^\r\n]*", Comment.Single),
@@ -48,7 +49,7 @@ class Val2Lexer(RegexLexer):  # type: ignore[misc]
         "line": [
             (r"\r\n|\r|\n", Whitespace, "#pop"),
             (r"[ \t\f\v\xa0]+", Whitespace),
-            (r";[^\r\n]*", Comment.Single),
+            (r"(?:;|#(?![A-Za-z]))[^\r\n]*", Comment.Single),
             (r'"[^"\r\n]*"', String.Double),
             (r'"[^\r\n]*', Error),
             (r"(?<=[,( \t])/[A-Za-z][0-9]*(?:\.[0-9]+)?(?=[ \t]*[,)\r\n;]|$)", String.Escape),

@@ -20,8 +20,9 @@ _SURELY_SHORT: Final = 120
 _INDENTED: Final = 250
 """Columns that structures may indent a line by, and a label."""
 _BREAK: Final = re.compile(r"[\r\n]")
-_BEFORE: Final = re.compile(r"\s*([0-9]+(?![A-Za-z0-9_.]))?\s*")
-_CODE: Final = re.compile(r'(?:[^";]|"[^"]*")*')
+_BEFORE: Final = re.compile(r"\s*(?:[0-9]+\.\??(?=\s|$)\s*)?(?:[0-9]+(?![A-Za-z0-9_.]))?\s*")
+"""A step's number, and a label."""
+_CODE: Final = re.compile(r'[^";#]*(?:(?:"[^"]*"|#(?=[A-Za-z]))[^";#]*)*')
 
 
 def lines_of(text: str) -> list[str]:
@@ -75,7 +76,7 @@ def cached_step(text: str, line: int) -> Step:
     """The step of a line that is short enough; files repeat their lines."""
     label, statement, comment = grammar.read(text, "line", line)
     found = _BEFORE.match(text)
-    begin = 0 if found is None or text[found.end() :][:1] in ("", ";") else found.end()
+    begin = 0 if found is None or text[found.end() :][:1] in ("", ";", "#") else found.end()
     return Step(statement, label, comment, TextPosition(line, begin + 1))
 
 
@@ -85,14 +86,12 @@ def split_comment(text: str, line: int) -> tuple[str, str | None]:
     Raises:
         ValError: If a string has no closing quote.
     """
-    code, semicolon, comment = text.partition(";")
-    if '"' in code:
-        found = _CODE.match(text)
-        end = found.end() if found else 0
-        if text[end : end + 1] == '"':
-            raise syntax_error("the string has no closing quote", line, end + 1)
-        code, semicolon, comment = text[:end], text[end : end + 1], text[end + 1 :]
-    return code, comment.rstrip() if semicolon else None
+    found = _CODE.match(text)
+    code = found[0] if found else ""
+    behind = text[len(code) :]
+    if behind.startswith('"'):
+        raise syntax_error("the string has no closing quote", line, len(code) + 1)
+    return code, behind[1:].rstrip() if behind else None
 
 
 def parse_expression(text: str) -> Expression:

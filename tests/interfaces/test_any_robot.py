@@ -302,8 +302,10 @@ def test_a_base_without_shapes_is_a_box_where_it_stands() -> None:
     assert pytest.approx([1.0, 3.0, 0.0, 1.0]) == X @ [1, 0, 0, 1]
 
 
-def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: Any) -> None:
-    with child("serve", "--port", "0", "--robot", BASE, "--room", "furnished", "--link-loss", "hold") as server:
+def test_a_base_of_another_size_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_page: Any) -> None:
+    path = tmp_path / "live.mcap"
+    where = "--room", "furnished", "--record", str(path), "--recordings", str(tmp_path)
+    with child("serve", "--port", "0", "--robot", BASE, "--link-loss", "hold", *where) as server:
         url = station(server)
         page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open(live=False)
         with connect_mobile(url.rstrip("/"), name="somebody", timeout=20.0) as robot:
@@ -318,5 +320,11 @@ def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: An
                 time.sleep(0.1)
             assert robot.wait(lambda it: it.postures.real.x > begun + 0.2, 30.0)
             assert not page.get("station.config.panels.some((panel) => panel.name === 'camera')")
+            page.wait("station.shared.record.now?.name === 'live.mcap'")
         assert page.errors == []
         page.page.context.close()
+    told = json.loads(vrs("compare", path, "--robot", BASE, "--json"))
+    assert told["robot"] == "cart"
+    assert told["path_error_max"] < 0.05
+    assert told["time_difference_mean"] > 0.0
+    assert "identical" in vrs("replay", path, "--commands", "--robot", BASE)

@@ -9,17 +9,11 @@ import numpy as np
 
 from interfaces import Designer
 from interfaces.lab.claims import Claim, Findings, Study
-from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, script, target
-from interfaces.link import Conditions, ConstantDelay, LinkConditions
-from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
+from interfaces.lab.doulgeri.script import D_B, D_F, HOME, MODEL, ScriptedSite, script, target, twins
+from interfaces.link import Conditions, ConstantDelay
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
 from vrs.ledger import Receipt
 
-D_F: Final = 0.3
-"""Forward delay [s]."""
-D_B: Final = 0.2
-"""Backward delay [s]."""
 II_C: Final = "Section II-C"
 IV: Final = "Section IV"
 
@@ -74,10 +68,8 @@ def over_a_link(D: float, seed: int, length: float) -> tuple[int, int, int]:
 def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands postponed at the operator's site and at the robot's, and how many both accepted or postponed."""
     rng = np.random.default_rng(seed)
-    operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
-    way = Conditions(delay=ConstantDelay("constant", D_F))
-    lab = Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
+    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, D)
+    operator = lab.operator
     mine: dict[int, float] = {}
 
     def give(command: MotionCommand, now: float) -> None:

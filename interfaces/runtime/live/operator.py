@@ -101,7 +101,9 @@ class LiveOperator(LeasedRobot, Workers):
         if which.is_base:
             twins = BaseTwins(which, config.conditions, config.seed, config.room)
         else:
-            twins = ArmTwins(which, config.conditions, config.seed, config.q, config.site)
+            twins = ArmTwins(
+                which, config.conditions, config.seed, q=config.q, config=config.site, rates=config.rates
+            )
         self.clock = WallClock()
         self.twins, self.operator, self.line, self.scene = twins, twins.operator, twins.line, twins.scene
         self._turning = Turning(self.clock, self._turn)
@@ -111,28 +113,24 @@ class LiveOperator(LeasedRobot, Workers):
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
-        rates = () if which.is_base else config.rates
-        hub = HubConfig(rates=rates, server=config.server, instance=secrets.token_urlsafe(9))
+        hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         workers = self if which.is_base else None
         self.hub = Hub(twins.site, lease, access, self, config=hub, emulation=self.emulation, workers=workers)
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
+        self.recording = SiteRecording(
+            config.recording, self.line, self.clock, lambda: self.robot.connected, seed=config.seed
+        )
+        """What is recorded here."""
         self.desk: TaskDesk | None = None
         """What lets a mobile robot do something by itself."""
-        self.recording: SiteRecording | None = None
-        """What is recorded of an arm."""
-        self.devices: tuple[OperatorDevice, ...]
+        self.devices: tuple[OperatorDevice, ...] = (self.recording,)
         """What stands here beside the robots' motion."""
         if isinstance(twins, BaseTwins):
             self.desk = TaskDesk(twins.operator, config.room, which.base, self.hub.tell, config.jobs, config.arm)
             media = MediaDevice(config.camera, config.room, twins, self.hub, self.clock, access)
-            self.devices = self.desk, media
-        else:
-            self.recording = SiteRecording(
-                config.recording, twins.line, self.clock, lambda: self.robot.connected, seed=config.seed
-            )
-            self.devices = (self.recording,)
+            self.devices = *self.devices, self.desk, media
         self._wants_resume = False
         self._ending: float | None = None
         """Since when a lease is ending [s]; None while none is."""
@@ -248,8 +246,7 @@ class LiveOperator(LeasedRobot, Workers):
 
     def _rerouted(self, now: float, text: str) -> None:
         """The emulated way to the robot has changed."""
-        if self.recording is not None:
-            self.recording.rerouted(now, text)
+        self.recording.rerouted(now, text)
         self._turning.soon()
 
     def lose(self, reason: str) -> None:

@@ -12,7 +12,7 @@ from typing_extensions import override
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN, LiveRecorder, LiveRecording
 from interfaces.runtime.live.devices import OperatorDevice
-from interfaces.teleop import RobotLine
+from interfaces.teleop.connection import SiteLine
 from vrs.clock import Clock, seconds_since_1970
 from vrs.errors import InvalidValueError
 
@@ -25,7 +25,7 @@ class SiteRecording(OperatorDevice):
     def __init__(
         self,
         first: LiveRecording | None,
-        line: RobotLine,
+        line: SiteLine[Any, Any, Any],
         clock: Clock,
         connected: Callable[[], bool],
         *,

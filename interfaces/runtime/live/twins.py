@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -97,7 +97,14 @@ class ArmTwins(LiveTwins[VirtualArm]):
     reports = Report
 
     def __init__(
-        self, robot: Robot, conditions: LinkConditions, seed: int, q: Array | None, config: OperatorSiteConfig
+        self,
+        robot: Robot,
+        conditions: LinkConditions,
+        seed: int,
+        *,
+        q: Array | None,
+        config: OperatorSiteConfig,
+        rates: Sequence[float],
     ) -> None:
         """Make the operator's site at session time 0.
 
@@ -107,6 +114,7 @@ class ArmTwins(LiveTwins[VirtualArm]):
             seed: Of what is random there.
             q: Where the virtual one stands at first [rad], (n,): the usual pose unless given.
             config: How the operator's site sends.
+            rates: Of the broadcasters [1/s].
         """
         model = robot.arm
         q = home(model) if q is None else q
@@ -115,6 +123,8 @@ class ArmTwins(LiveTwins[VirtualArm]):
         self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
         self.line: RobotLine = RobotLine(self.operator, conditions, np.random.default_rng(seed))
         self.site = Site(virtual.engine)
+        for rate in rates:
+            self.site.broadcast(rate)
         self.scene = TwinScene(robot)
 
     @property

@@ -48,9 +48,8 @@ class Control:
         """
         return ControlState.HELD
 
-    def share(self, session: str) -> bool:  # noqa: ARG002
-        """Share the right that a session has; whether it has any."""
-        return True
+    def regain(self) -> None:
+        """Take up again what is there without asking for more, after it ended."""
 
     @property
     def held(self) -> bool:
@@ -89,8 +88,6 @@ class SharedController:
         self.controller, self.control = controller, control
         self.holder: Listener | None = None
         """The terminal in control."""
-        self._session: str | None = None
-        """Whose right it has; None for the controller's own."""
 
     def request(self, terminal: Listener, session: str | None = None, *, now: float) -> ControlAnswer:
         """Ask for control for a terminal.
@@ -111,7 +108,7 @@ class SharedController:
             self.holder = None
         answer = self.control.request(session, now=now)
         if answer is ControlState.HELD:
-            self.holder, self._session = terminal, session
+            self.holder = terminal
         return answer
 
     @property
@@ -126,8 +123,7 @@ class SharedController:
         why = self.control.pop_lapse()
         if why and self._runs:
             self.controller.interrupt(ValError("Motion interrupted", why), now=now)
-            if self._session is not None:
-                self.control.share(self._session)
+            self.control.regain()
             if self.control.held:
                 self.controller.arm.withdraw(now=now)
 
@@ -208,9 +204,11 @@ class LeaseControl(Control):
             self._granted = now
         return lease
 
-    def _has(self, session: str | None, lease: Lease | None) -> bool:  # noqa: ARG002
+    def _has(self, session: str | None, lease: Lease | None) -> bool:
         """Whether the lease is there that was asked for."""
-        return lease is not None and lease.yours and lease.commands and not self._release_pending
+        if session is not None or lease is None:
+            return False
+        return lease.yours and lease.commands and not self._release_pending
 
     def _followed(self, now: float) -> ControlState:
         """Wait until the robot follows this lease; one that doesn't in time says why to those who command it."""
@@ -231,8 +229,9 @@ class LeaseControl(Control):
             self._acquire(session)
         return ControlState.PENDING
 
-    def _acquire(self, session: str | None) -> None:  # noqa: ARG002
-        self._client.ask(Acquire)
+    def _acquire(self, session: str | None) -> None:
+        if session is None:
+            self._client.ask(Acquire)
 
     @property
     def _release_pending(self) -> bool:
@@ -289,25 +288,28 @@ class ServedControl(LeaseControl):
         super().__init__(client)
         self._local = client
         self._lender: str | None = None
-        """Whose lease is shared."""
+        """Whose lease is shared; None where it's the client's own."""
 
     @override
-    def share(self, session: str) -> bool:
+    def regain(self) -> None:
+        if self._lender is not None:
+            self._share(self._lender)
+
+    def _share(self, session: str) -> bool:
         shared = isinstance(self._local.ask(lambda number: Share(number, session)), Lease)
-        if shared:
-            self._lender = session
+        self._lender = session if shared else self._lender
         return shared
 
     @override
     def _has(self, session: str | None, lease: Lease | None) -> bool:
         if session is None:
+            self._lender = None
             return super()._has(session, lease)
         shares = lease is not None and lease.shared and session == self._lender
-        return shares or self.share(session)
+        return shares or self._share(session)
 
     @override
     def _acquire(self, session: str | None) -> None:
-        if session is None:
-            super()._acquire(session)
-        else:
+        super()._acquire(session)
+        if session is not None:
             self._local.let_acquire(session)

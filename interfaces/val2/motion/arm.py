@@ -95,8 +95,8 @@ class Arm(SettingsInForce):
         self._at: float | None = None
         self._delay: tuple[float, float] | None = None
         """When a DELAY may begin at the earliest, and how long it lasts [s]."""
-        self._unanswered: list[tuple[int, bool]] = []
-        """What has no answer yet, and whether it's a straight line."""
+        self._unanswered: deque[int] = deque()
+        """What has no answer yet."""
         self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
         self._interrupted: tuple[MotionCommand, ...] = ()
         self._asked_ahead: tuple[int, ...] = ()
@@ -181,13 +181,12 @@ class Arm(SettingsInForce):
         """
         self._update(now)
         while self._unanswered:
-            number, straight = self._unanswered[0]
-            outcome = self.robot.outcome(number, now=now)
+            outcome = self.robot.outcome(self._unanswered[0], now=now)
             if outcome is None:
                 return False
-            self._unanswered.pop(0)
+            self._unanswered.popleft()
             if outcome.reason:
-                raise _refusal(outcome, straight)
+                raise _refusal(outcome)
         self._check_interrupted(now)
         return not self._pace.waits
 
@@ -280,13 +279,19 @@ class Arm(SettingsInForce):
         """Whether the arm is on a motion that a program or the monitor asked for, and no correction by ALTOUT."""
         return bool(self._recent) and self._recent[-1][0] != self._correction and now < self.robot.timeline.end
 
-    def _send(self, command: Command | None, straight: bool, now: float) -> int:
+    def _send(self, command: Command, now: float) -> int:
         number = self.robot.ask(command, now=now)
         outcome = self.robot.outcome(number, now=now)
         if outcome is None:
-            self._unanswered.append((number, straight))
+            self._unanswered.append(number)
         elif outcome.reason:
-            raise _refusal(outcome, straight)
+            raise _refusal(outcome)
+        return number
+
+    def _go(self, command: MotionCommand, now: float) -> int:
+        """Ask for a motion, at whose destination the arm is to arrive."""
+        number = self._awaited = self._send(command, now)
+        self._recent.append((number, command))
         return number
 
     # Motions.
@@ -366,8 +371,7 @@ class Arm(SettingsInForce):
                 pace=bounded(self._pace.pace),
                 tool=self._frames.tip(),
             )
-            self._correction = self._awaited = number = self._send(command, True, now)
-            self._recent.append((number, command))
+            self._correction = self._go(command, now)
             self._delay = None
         self._alterations.taken(place)
 
@@ -406,9 +410,7 @@ class Arm(SettingsInForce):
             )
             if manner.duration > 0:
                 command = self._stretched(command, near, manner.duration)
-            number = self._send(command, straight, now)
-            self._recent.append((number, command))
-            self._awaited = number
+            number = self._go(command, now)
             if manner.hand is not None or manner.relaxes:
                 self._hand.ask(number, manner.hand)
             self._hand.begin(self._begins, now)
@@ -442,7 +444,7 @@ class Arm(SettingsInForce):
         self._update(now)
         self._give_up(now, self.robot.timeline.end)
         if now < self.robot.timeline.end or self._unanswered:
-            self._send(Stop(), False, now)
+            self._send(Stop(), now)
 
     def give_up(self, *, now: float) -> None:
         """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
@@ -468,9 +470,7 @@ class Arm(SettingsInForce):
         interrupted, self._interrupted = self._interrupted, ()
         for command in interrupted:
             again = replace(command, execute_at=None, pace=bounded(self._pace.pace))
-            number = self._send(again, command.motion is Motion.LINE, now)
-            self._recent.append((number, again))
-            self._awaited = number
+            self._go(again, now)
         return bool(interrupted)
 
     # The timeline.
@@ -484,7 +484,7 @@ class Arm(SettingsInForce):
         number = self.robot.ask(None, now=now)
         outcome = self.robot.outcome(number, now=now)
         if outcome is None:
-            self._unanswered.append((number, False))
+            self._unanswered.append(number)
             return "The newest command is taken back"
         if outcome.reason or outcome.receipt is None:
             return "Nothing was taken back" + (f": {outcome.reason}" if outcome.reason else "")
@@ -497,15 +497,14 @@ class Arm(SettingsInForce):
         newest = self.robot.newest
         outcomes = (self.robot.outcome(n, now=now) for n in range(max(newest - _LISTED, 0) + 1, newest + 1))
         for receipt in _standing((o.receipt for o in outcomes if o is not None and o.receipt is not None), now):
-            q = receipt.q
-            joints = "" if q is None else self._spelled(q)
+            joints = ""
+            if receipt.q is not None:
+                at = self._frames.where(receipt.q, 0.0).joints
+                joints = " ".join(f"{value:8.2f}" for value in at.joints)
             lines.append(
                 f"{receipt.command_id:6d} {receipt.execute_at:10.3f} {receipt.end:10.3f}  {joints}".rstrip()
             )
         return lines
-
-    def _spelled(self, q: Array) -> str:
-        return " ".join(f"{value:8.2f}" for value in self._frames.where(q, 0.0).joints.joints)
 
     # For the next motion, or those after it.
 
@@ -574,7 +573,7 @@ class Arm(SettingsInForce):
         self._alterations.set(None)
 
 
-def _refusal(outcome: Issued, straight: bool) -> ValError:
+def _refusal(outcome: Issued) -> ValError:
     """What a refusal is in VAL's words."""
     if outcome.code is RefusalCode.OVERRULED:
         return ValError("Motion interrupted", TAKEN)
@@ -583,7 +582,7 @@ def _refusal(outcome: Issued, straight: bool) -> ValError:
     if outcome.code is RefusalCode.NOT_FOLLOWING:
         why = outcome.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
         return robot_halted(why)
-    if straight:
+    if isinstance(outcome.command, MotionCommand) and outcome.command.motion is Motion.LINE:
         return ValError(
             "Straight line not possible", in_millimetres(outcome.reason.removeprefix("no straight line: "))
         )

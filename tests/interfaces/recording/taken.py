@@ -71,6 +71,8 @@ class Sitting:
         )  # fmt: skip
         self.writer = RecordingWriter(path, begin)
         self.capture.put = self.writer.write
+        for message in self.capture.first():
+            self.capture.add(0.0, message)
         self.timelines = [self.site.robot.engine.timeline]
         """Every one that there was, one after the other."""
         self._source = Generator(seed)

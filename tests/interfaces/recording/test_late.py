@@ -40,6 +40,8 @@ def begin_late(sitting, path, **given):
     )  # fmt: skip
     sitting.writer = RecordingWriter(path, begin)
     capture.put = sitting.writer.write
+    for message in capture.first():
+        capture.add(now, message)
     sitting.timelines = [engine.timeline]
 
 

@@ -154,6 +154,11 @@ def test_what_has_no_meaning_here_is_a_warning():
     ]
 
 
+def test_what_is_read_of_a_file_counts_as_set():
+    rows = found('ATTACH (lun, 4) "DISK"', "READ (lun) $line, n", "TYPE $line, n, lun")
+    assert [(what, line) for _, what, _, line, _ in rows] == [("No meaning here", 2), ("Not available", 3)]
+
+
 def test_long_names_that_become_the_same_are_a_warning():
     (row,) = found("center.position.x = 1", "center.position.y = 2")
     assert row == (

@@ -29,6 +29,9 @@ class Held:
         why, self.why = self.why, ""
         return why
 
+    def regain(self):
+        pass
+
     def request(self, session=None, *, now):
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 

@@ -126,6 +126,14 @@ def test_joints_reals_and_strings_come_back_exactly(joints, real, text):
     assert parse_file(print_file(source), "f") == source
 
 
+def test_files_of_v_plus_have_other_comments_and_step_numbers():
+    text = (
+        "# demo\n.PROGRAM main() # x\n  1.  MOVE #p\n  2.\n.END\n.LOCATIONS\n# six\n#p 1 2 3 4 5 6 # joints\n.END\n"
+    )
+    source = parse_file(text, "f")
+    assert print_file(source) == (".PROGRAM main() ; x\n      MOVE #p\n\n.END\n.LOCATIONS\n#p 1 2 3 4 5 6\n.END\n")
+
+
 def test_upright_poses_are_printed_with_o_90():
     assert numbers_of(Transformation(np.eye(4))) == (0, 0, 0, 90, -90, 0)
     assert numbers_of(from_oat(1, 2, 3, 30, 90, 0))[3:5] == (90, 90)
