@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from interfaces.lab.driving.run import run
-from interfaces.messages.drive_sites import ArcPacket
+from interfaces.messages.sites import ArcPacket
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Constants
 from robots.onboard.driving import STAND, Drive, Posture

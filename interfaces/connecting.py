@@ -51,8 +51,7 @@ def connect_mobile(
     timeout: float = 5.0,
 ) -> Connection:
     """Reach a mobile robot that `vrs serve --robot NAME` serves; see `connect`."""
-    from interfaces.messages.control import Role
-    from interfaces.messages.mobile import MobileWelcome
+    from interfaces.messages.control import MobileWelcome, Role
     from interfaces.stream.client import ClientCore
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import Connection

@@ -8,18 +8,22 @@ from __future__ import annotations
 import enum
 from typing import Annotated, ClassVar, TypeAlias
 
+import msgspec
 from msgspec import Meta
 
 from interfaces.messages import fields
 from interfaces.messages.fields import (
     MOST_JOINTS,
     Count,
+    Distance,
     Epoch,
     Leased,
     Message,
     Name,
     Number,
     Party,
+    PointRow,
+    Points,
     Rate,
     Span,
     Stamp,
@@ -29,8 +33,10 @@ from interfaces.messages.fields import (
     Value,
     Word,
 )
+from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile import DriveLimits
 from vrs.model import Array, Limits
 from vrs.record import Record
 
@@ -308,6 +314,45 @@ class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
             raise InvalidValueError("dof", self.dof, f"as wide as limits and poses, {sorted(widths)}")
 
 
+Positive = Annotated[float, Meta(gt=0, le=1e9)]
+
+
+class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
+    """The client may go on; what there is."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    secrets: ClassVar[tuple[str, ...]] = ("session",)
+    protocol: Number
+    """Version of the protocol that is spoken."""
+
+    session: Word
+    """Secret: names this session, for a later `Hello`."""
+    role: Role
+    """What the client may do."""
+    robot: Word
+    """Name of the robot's model."""
+    limits: DriveLimits
+    """`v_max` [m/s], `w_max` [rad/s], `a_max` [m/s²], `alpha_max` [rad/s²]."""
+    period: Positive
+    """T: the virtual robot takes a command so often [s]."""
+    holds: Positive
+    """A `drive` order counts for so long after it was issued [s]."""
+    now: Time
+    """Session time [s]."""
+    lease: Lease
+    """As it is now."""
+    lease_timeout: Timeout
+    """It expires so long after the last beat or order [s]."""
+    resumed: bool = False
+    """Whether the session that was asked for goes on."""
+    instance: Word = ""
+    """Names this run of the server; with another one forget all."""
+    server: Word = ""
+    """Name and version of the program."""
+    room: Word = ""
+    """Name of the room."""
+
+
 class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="attached"):
     """Follows the operator's site that said hello; what it is and how it behaves."""
 
@@ -438,6 +483,98 @@ class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="st
     before, session time [s]. What the real network adds isn't in it."""
     late: Annotated[tuple[tuple[Time, Array], ...], Meta(max_length=MOST_LATE)] = ()
     """[t, joints]: measurements that came after later ones, one of six; each for 0.2 s, so some come twice."""
+
+
+class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"):
+    """Where both robots are; the newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    number: Number
+    """Counts up."""
+    now: Time
+    """Session time when it was made [s]."""
+    virtual: Posture
+    """Of the virtual robot, now [m, m, rad]."""
+    command: Drive
+    """What it drives [m/s, rad/s]."""
+    estimate: Posture
+    """Where the real robot is thought to come to with all commands so far (the posture estimator). Source: Han et
+    al., eq. (8)–(10)."""
+    t: Time | None = None
+    """Session time of the newest measurement [s]; absent before the first, as the next two."""
+    real: Posture | None = None
+    """Where the real robot took itself to be."""
+    drive: Drive | None = None
+    """What its motors are told."""
+    D: Time | None = None
+    """The time of the path that it's to play less session time, by the clock as the robot has it, without what
+    braking needs [s]; absent where its architecture has none."""
+    starved: bool = False
+    """Whether it's slower than it should be, as it knows nothing newer."""
+    path_error: Distance | None = None
+    """Distance from the nearest place of the virtual robot's path near the one before [m]; absent while it doesn't
+    follow."""
+    time_difference: Distance | None = None
+    """How much later it is there [s]; 0 where both stand."""
+    epoch: Epoch | None = None
+    """Of the drive that it follows; absent: none."""
+    connected: bool = True
+    """Whether the robot is heard of."""
+    halted: Text = ""
+    """As in `state`."""
+    drives: Count = 0
+    """How often the virtual robot was put where the real one stood: a drive begins with each lease and `Resume`,
+    and after a stop."""
+    round_trip: Value | None = None
+    """As in `state`."""
+    messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
+    """As in `state`."""
+    drawn: Posture | None = None
+    """Where the virtual robot is drawn, where the posture estimator has it now; absent where that's `virtual`, as
+    in architectures without one."""
+
+
+Variance = Annotated[float, Meta(ge=-1e9, le=1e9)]
+"""[m²]."""
+Doubt = tuple[Variance, Variance, Variance]
+
+
+class SensedPoints(Record, frozen=True, omit_defaults=True, gc=False):
+    """What a robot sees of its surroundings."""
+
+    time: Stamp
+    """By the robot's own clock [s]."""
+    points: Points = ()
+    """Where its laser's beams ended, on the map [m]."""
+    doubt: Doubt | None = None
+    """Of its place: variance of x, covariance, variance of y [m²]; None where nobody knows."""
+
+
+MOST_THINGS = 1000
+"""Outlines of a map."""
+MOST_CORNERS = 64
+"""Of an outline."""
+Outline = Annotated[tuple[PointRow, ...], Meta(max_length=MOST_CORNERS)]
+
+
+class Seen(Message, SensedPoints, frozen=True, omit_defaults=True, gc=False, tag="seen"):
+    """What the robot sees of its surroundings; the newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
+
+
+class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
+    """The known map of where the robot drives."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    size: PointRow
+    """Length and width of the floor [m]."""
+    things: Annotated[tuple[Outline, ...], Meta(max_length=MOST_THINGS)] = ()
+    """Outlines of what the map knows [m]."""
+    via: Points = ()
+    """Via points [m]."""
+    robot: tuple[Distance, Distance, Distance] = msgspec.field(default_factory=lambda: (0.0, 0.0, 0.0))
+    """What it reaches ahead and back from its axle, and its width [m]."""
 
 
 LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume

@@ -1,4 +1,4 @@
-"""What a robot is asked to do, one after the other: jobs, named places, the list of them, and how far it is.
+"""What a robot does by itself: goals, jobs, named places, the list of them, how far it is, and who asks for it.
 
 Source: Kim, Han, Kim, Kim, section 4.1: MOVE, VOICE, MESSAGE and WAIT; ARM is ours.
 """
@@ -6,14 +6,26 @@ Source: Kim, Han, Kim, Kim, section 4.1: MOVE, VOICE, MESSAGE and WAIT; ARM is o
 from __future__ import annotations
 
 import enum
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
-from interfaces.messages.fields import Number, Points, Span, Text
-from robots.onboard.journey import Goal
+from interfaces.messages.fields import (
+    Count,
+    Distance,
+    Epoch,
+    Leased,
+    Message,
+    Number,
+    Party,
+    Points,
+    Span,
+    Text,
+    Word,
+)
+from robots.onboard.journey import Goal, JourneyState
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.record import Record, set_field
@@ -282,3 +294,132 @@ class JobForecast(Record, frozen=True, omit_defaults=True, gc=False):
 
 Forecast = Annotated[tuple[JobForecast, ...], Meta(max_length=MOST_JOBS)]
 """What is likely to become of a list: of its jobs in their order, up to the first that'd fail."""
+
+
+NONE_LEFT: Final = 0.0
+"""Of a way [m]: a field with it isn't written, where it's this very number."""
+
+
+class RobotTask(Record, frozen=True, omit_defaults=True, gc=False):
+    """What a robot, or a list of jobs, is asked to do: `go`, `do`, `jobs` or `halt`."""
+
+    go: Goal | None = None
+    """Drive there; a list of jobs that is being done is paused."""
+    do: ListCommand | None = None
+    jobs: JobList | None = None
+    """Take this list in place of the one before; not while that is being done."""
+    progress: Progress | None = None
+    """How far that list is already; None: as far as is known of jobs with the same number that are unchanged."""
+    halt: Text | None = None
+    """Between sites: stop, and leave off whatever it does by itself, for this reason; a list of jobs is paused."""
+
+    def __post_init__(self) -> None:
+        given = [name for name in ("go", "do", "jobs", "halt") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InvalidValueError("task", ", ".join(given), "one of go, do, jobs and halt")
+
+    @property
+    def stops(self) -> bool:
+        """Whether it only stops something: it counts however late it comes."""
+        return self.halt is not None or self.do in (ListCommand.PAUSE, ListCommand.ABORT)
+
+
+HALT: Final = RobotTask(halt="somebody stopped the robot")
+"""What a stop tells a robot that does something by itself."""
+
+
+class Errand(Record, frozen=True, omit_defaults=True, gc=False):
+    """A task with its number: it's sent until the robot says that it has it, and done once."""
+
+    number: Number
+    """From 1."""
+    task: RobotTask
+    """What is to be done."""
+
+    def __post_init__(self) -> None:
+        if self.task.do is ListCommand.DRY_RUN:
+            raise InvalidValueError("task", self.task.do.value, "what a robot does")
+
+
+class Doing(enum.StrEnum):
+    """What a robot does by itself."""
+
+    NOTHING = "nothing"
+    GOAL = "goal"
+    JOBS = "jobs"
+
+
+class TaskReport(Record, frozen=True, omit_defaults=True, gc=False):
+    """How far a robot is with what it does by itself."""
+
+    journey: JourneyState = JourneyState.IDLE
+    reason: Text = ""
+    """Why it waits or couldn't get there."""
+    goal: Goal | None = None
+    """Where to."""
+    route: Points = ()
+    """The way that's being driven [m]."""
+    digest: Word = ""
+    """Of the list of jobs that it has."""
+    progress: Progress = msgspec.field(default_factory=Progress)
+    """How far that is."""
+    loss: OperatorLoss = OperatorLoss.STOP
+    """What follows when the operator is lost."""
+    shows: Text = ""
+    """What stands on its screen."""
+    says: Text = ""
+    """What it's saying."""
+
+
+class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):
+    """Let the robot do something by itself. The answer is a `Tasks` or a `Problem`."""
+
+    sender: ClassVar[Party] = Party.HOLDER
+    number: Number
+    """The client's own; the answer has it, too."""
+    task: RobotTask
+    """What."""
+    epoch: Epoch | None = None
+    """Of the control lease."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.task.halt is not None:
+            raise InvalidValueError("task", "halt", "go, do or jobs: the order of a stop halts")
+
+
+class Tasks(Message, frozen=True, omit_defaults=True, gc=False, tag="tasks"):
+    """What the robot does by itself, and the list of jobs; the newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    doing: Doing = Doing.NOTHING
+    """What that is."""
+    journey: JourneyState = JourneyState.IDLE
+    reason: Text = ""
+    """Why it waits or couldn't get there."""
+    goal: Goal | None = None
+    """Where to."""
+    route: Points = ()
+    """The way there [m]."""
+    left: Distance = NONE_LEFT
+    """How much of it is left [m]."""
+    jobs: JobList = msgspec.field(default_factory=JobList)
+    """The list."""
+    progress: Progress = msgspec.field(default_factory=Progress)
+    """How far that is."""
+    forecast: Forecast | None = None
+    """What the dry run said of this list; None where there was none since it was changed."""
+    loss: OperatorLoss | None = None
+    """What follows when the operator is lost; None before the robot is met."""
+    shows: Text = ""
+    """What stands on its screen."""
+    says: Text = ""
+    """What it's saying."""
+    problem: Text = ""
+    """What is wrong with the file of the list; empty if nothing is."""
+    answers: Count | None = None
+    """Number of the receiver's order that this answers."""
+
+    def __post_init__(self) -> None:
+        if not self.left:
+            set_field(self, "left", NONE_LEFT)

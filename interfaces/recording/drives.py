@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from interfaces.messages.drive_sites import Doing
 from interfaces.messages.fields import text
+from interfaces.messages.jobs import Doing
 from interfaces.messages.recording import (
     OWN,
     DriveFacts,

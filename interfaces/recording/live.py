@@ -13,7 +13,6 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.messages import fields
-from interfaces.messages.drive_sites import DriveReport
 from interfaces.messages.recording import (
     OWN,
     Begin,
@@ -24,7 +23,7 @@ from interfaces.messages.recording import (
     RealSample,
     RunEvent,
 )
-from interfaces.messages.sites import Report, Sample
+from interfaces.messages.sites import DriveReport, Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.channels import Message
 from interfaces.recording.drives import LiveDrives

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.link.link import Link
-from interfaces.messages.drive_sites import ArchitectureReport, ArcPacket
 from interfaces.messages.recording import Direction
+from interfaces.messages.sites import ArchitectureReport, ArcPacket
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room

@@ -16,9 +16,19 @@ from interfaces.engine_server.site import earliest
 from interfaces.link.clock_sync import ClockSync
 from interfaces.link.round_trip import RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request, control
-from interfaces.messages.control import Impair, Network, Notice, Ping, Pong, ProblemCode, Role, Survey
+from interfaces.messages.control import (
+    Impair,
+    MobileWelcome,
+    Network,
+    Notice,
+    Ping,
+    Pong,
+    ProblemCode,
+    Role,
+    Survey,
+)
 from interfaces.messages.fields import Epoch
-from interfaces.messages.mobile import MobileWelcome, TaskOrder, Tasks
+from interfaces.messages.jobs import TaskOrder, Tasks
 from interfaces.stream.codec import LARGEST, Encoding, News, Value, Welcomed, decode, encode
 
 FROM_SERVER = 4 * LARGEST

@@ -14,11 +14,22 @@ import msgspec
 
 from interfaces import messages
 from interfaces.messages import Reply, Request, control
-from interfaces.messages.control import Notice, Pong, ProblemCode, ProtocolError, Question, Role, may_send
-from interfaces.messages.drive_sites import DriveOrders, DriveReport
+from interfaces.messages.control import (
+    MobileWelcome,
+    Notice,
+    Plan,
+    Pong,
+    Postures,
+    ProblemCode,
+    ProtocolError,
+    Question,
+    Role,
+    Seen,
+    may_send,
+)
 from interfaces.messages.fields import Message, Party, check_normal, plain, rich, writer
-from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.messages.sites import Orders, Report
+from interfaces.messages.jobs import TaskOrder, Tasks
+from interfaces.messages.sites import DriveOrders, DriveReport, Orders, Report
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536

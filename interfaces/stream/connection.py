@@ -17,17 +17,19 @@ from interfaces.messages.control import (
     DirectionConditions,
     Impair,
     Lease,
+    MobileWelcome,
     Network,
+    Plan,
+    Postures,
     Problem,
     ProblemCode,
     Role,
+    Seen,
     State,
     Survey,
 )
-from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.fields import Epoch
-from interfaces.messages.jobs import Forecast, JobList, ListCommand
-from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
+from interfaces.messages.jobs import Doing, Forecast, JobList, ListCommand, RobotTask, TaskOrder, Tasks
 from interfaces.stream.client import Ask, ClientCore, Phase, Replied
 from interfaces.stream.client_socket import Line, UnreachableError
 from interfaces.stream.codec import Welcomed

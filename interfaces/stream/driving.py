@@ -8,8 +8,7 @@ from typing import Any
 
 from interfaces.link.delivery import OrderBook
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode, Request
-from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
-from interfaces.messages.mobile import MobileWelcome
+from interfaces.messages.control import PROTOCOL, MobileWelcome, Problem, ProblemCode
 from interfaces.stream.codec import Value
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import HOLDS, VirtualBase

@@ -23,6 +23,7 @@ from interfaces.messages.control import (
     Network,
     Ping,
     Pong,
+    Postures,
     Problem,
     ProblemCode,
     ProtocolError,
@@ -30,8 +31,7 @@ from interfaces.messages.control import (
     Survey,
     may_send,
 )
-from interfaces.messages.drive_sites import RobotTask
-from interfaces.messages.mobile import Postures, TaskOrder, Tasks
+from interfaces.messages.jobs import RobotTask, TaskOrder, Tasks
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
 from interfaces.stream.leasing import LeasedRobot, Leasing, SessionState, Wish

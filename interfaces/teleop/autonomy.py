@@ -25,9 +25,18 @@ from interfaces.jobs.runner import (
     SilentSpeaker,
     Speaker,
 )
-from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
+from interfaces.messages.control import SensedPoints
 from interfaces.messages.fields import MOST_POINTS
-from interfaces.messages.jobs import ArmJob, ListCommand, MoveJob, OperatorLoss, VoiceJob
+from interfaces.messages.jobs import (
+    ArmJob,
+    Doing,
+    ListCommand,
+    MoveJob,
+    OperatorLoss,
+    RobotTask,
+    TaskReport,
+    VoiceJob,
+)
 from robots.mobile.navigation import BodyNavigator
 from robots.mobile.position import LaserPosition
 from robots.mobile.robot import MobileRobot

@@ -14,7 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -24,32 +24,11 @@ from interfaces.link.clock_sync import ClockSync
 from interfaces.link.packets import PacketRecord
 from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
 from interfaces.messages.control import Ping, Pong
-from interfaces.teleop.robot import O, R, RobotSite
+from interfaces.teleop.operator import OperatorSite, R, V_co
+from interfaces.teleop.robot import O, RobotSite
 from robots.onboard import LossPolicy, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
-
-O_co = TypeVar("O_co", covariant=True)
-R_contra = TypeVar("R_contra", contravariant=True)
-
-
-class OrderSource(Protocol[O_co, R_contra]):
-    """An operator's site: what gives orders, and hears reports. Times are the operator's [s]."""
-
-    def advance(self, *, now: float) -> tuple[O_co, ...]:
-        """Do what is due, and say what is to be sent."""
-
-    def receive(self, report: R_contra, *, now: float) -> None:
-        """Take in a report."""
-
-    def next_deadline(self) -> float:
-        """When there's something to do."""
-
-    def measure_anew(self, *, now: float) -> None:
-        """Forget what was measured of the way: it's another one."""
-
-
-S = TypeVar("S", bound=OrderSource)  # type: ignore[type-arg]
 
 LOGGED = 500
 """Records of packets that each way keeps until somebody takes them."""
@@ -57,10 +36,10 @@ TOLD = 64
 """Messages to the robot of which `RobotLine.messages` tells at once, at most."""
 
 
-class SiteLine(Generic[S, O, R]):
+class SiteLine(Generic[V_co, O, R]):
     """Carries what the operator's site says to a connection, and back. Times are the operator's session time."""
 
-    def __init__(self, operator: S, conditions: LinkConditions, rng: np.random.Generator) -> None:
+    def __init__(self, operator: OperatorSite[V_co], conditions: LinkConditions, rng: np.random.Generator) -> None:
         """Begin without a connection.
 
         Args:

@@ -9,8 +9,10 @@ from typing import Annotated
 
 from typing_extensions import override
 
-from interfaces.messages.drive_sites import Doing, DriveOrders, DriveReport, Errand, SensedPoints, TaskReport
+from interfaces.messages.control import SensedPoints
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import Doing, Errand, TaskReport
+from interfaces.messages.sites import DriveOrders, DriveReport
 from interfaces.teleop.architectures import ArchitectureRobotSite, TimelineController
 from interfaces.teleop.autonomy import Autonomy
 from interfaces.teleop.connection import Host

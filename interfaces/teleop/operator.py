@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import Sample, SiteReport
 from interfaces.teleop.halt import Halt, HaltCause
 from vrs.engine import Engine
 from vrs.ledger import Receipt
@@ -28,26 +28,6 @@ class Correction(NamedTuple):
     error: Array
     """By how much it was off, (n,) [rad]; of a base (x, y, θ) [m, m, rad]."""
     reason: str
-
-
-class SiteReport(Protocol):
-    """A message of a robot's site, of any kind of robot."""
-
-    @property
-    def epoch(self) -> int | None:
-        """That the robot follows; None before the first."""
-
-    @property
-    def number(self) -> int:
-        """It rises from message to message."""
-
-    @property
-    def sent_at(self) -> float:
-        """By the robot's clock, as it takes the operator's to be [s]."""
-
-    @property
-    def echo(self) -> tuple[int, float, float] | None:
-        """The newest orders heard: their number, when they were sent, and when they arrived [s]."""
 
 
 O = TypeVar("O")  # noqa: E741 - orders
@@ -85,12 +65,10 @@ class SiteObserver(Protocol[R_contra, T_contra]):
 class VirtualRobot(Protocol[O_co, R_contra]):
     """What answers the operator at once, and what of that goes to the real robot. Times are the operator's [s]."""
 
-    @property
-    def engine(self) -> Engine:
-        """What the operator's commands make."""
-
-    def join(self, site: OperatorSite[Any]) -> None:
-        """Be the virtual robot of a site."""
+    engine: Engine
+    """What the operator's commands make."""
+    site: OperatorSite[Any]
+    """Where it's the virtual robot; that site says so."""
 
     def stop(self, *, now: float) -> None:
         """Let both robots come to rest."""
@@ -161,7 +139,7 @@ class OperatorSite(Generic[V_co]):
         self._measured_since = -math.inf
         self._packets = 0
         self._report: Any = None
-        robot.join(self)
+        robot.site = self
 
     @property
     def cause(self) -> HaltCause | None:

@@ -8,29 +8,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Generic, Protocol, TypeVar
+from typing import Annotated, ClassVar, Generic, TypeVar
 
 from interfaces.link.delays import share_of
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from interfaces.messages.sites import SiteOrders
 from robots.onboard.watchdog import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import validated, within
-
-
-class SiteOrders(Protocol):
-    """A message of an operator's site, to any kind of robot."""
-
-    @property
-    def epoch(self) -> int:
-        """Of the operator's."""
-
-    @property
-    def number(self) -> int:
-        """It rises from message to message."""
-
-    @property
-    def sent_at(self) -> float:
-        """By the operator's clock [s]."""
-
 
 O = TypeVar("O", bound=SiteOrders)  # noqa: E741 - orders
 R = TypeVar("R")

@@ -152,6 +152,9 @@ class OperatorSiteConfig:
 class VirtualArm(VirtualRobot[Orders, Report]):
     """An arm that answers commands at once, on an engine of its own, and sends them on."""
 
+    engine: LoggedEngine
+    site: OperatorSite[VirtualArm]
+
     def __init__(
         self,
         model: RobotModel,
@@ -174,8 +177,8 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         self._model, self._lateness = model, lateness
         self.clock = ManualClock(now)
         """The engine's; calls here set it."""
-        self._engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self.clock, lateness=lateness)
-        self._site: OperatorSite[VirtualArm]
+        self.engine = LoggedEngine(self._refusal, self._told, model, q=q, clock=self.clock, lateness=lateness)
+        """What it's told goes to the real robot, whoever tells it."""
         self._began = now
         self.corrections: list[Correction] = []
         self.receipts: dict[int, Receipt] = {}
@@ -199,16 +202,6 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         self._compared: tuple[int, ...] = ()
         """Versions of the plans, and entries under way, that were found to lead the same way."""
 
-    @override
-    def join(self, site: OperatorSite[VirtualArm]) -> None:
-        self._site = site
-
-    @property
-    @override
-    def engine(self) -> LoggedEngine:
-        """What it's told goes to the real robot, whoever tells it."""
-        return self._engine
-
     def execute(self, command: Command, *, now: float) -> Receipt | Position | None:
         """Carry out a command on the virtual robot, and send it on if it's accepted; the engine does so, too.
 
@@ -227,7 +220,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
 
     def _refusal(self) -> Refusal | None:
         """Why the robot can't be commanded; None if it can."""
-        site = self._site
+        site = self.site
         if site.gone:
             return not_following(site.gone)
         if site.halted is not None:
@@ -254,7 +247,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
             self.log.add((entry, now))
             if command is not None and answer is not None:
                 self.command_ids[number] = answer.command_id
-        self._site.inform(lambda listener: listener.commanded(deed))
+        self.site.inform(lambda listener: listener.commanded(deed))
 
     @override
     def stop(self, *, now: float) -> None:
@@ -267,10 +260,10 @@ class VirtualArm(VirtualRobot[Orders, Report]):
     @property
     @override
     def done(self) -> bool:
-        report = self._site.report
+        report = self.site.report
         if report is None or report.halted:
             return True
-        return report.epoch == self._site.epoch and report.play >= self.engine.timeline.end
+        return report.epoch == self.site.epoch and report.play >= self.engine.timeline.end
 
     @override
     def shown(self, *, now: float) -> Array:
@@ -290,7 +283,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         chosen = {*range(self.newest_sent + 1 - self.config.repeat, self.log.count + 1), *lost}
         entries = tuple(waiting[entry][0] for entry in sorted(chosen) if entry in waiting)
         self.newest_sent = self.log.count
-        site, report = self._site, self._site.report
+        site, report = self.site, self.site.report
         heard = 0 if report is None else report.number
         wanted = self.gathering.wanted(now=now, patience=patience)
         # A robot that knows that it has halted isn't told.
@@ -305,7 +298,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
     @override
     def hear(self, report: Report, *, new: bool, now: float) -> bool:
         self.clock.set(now)
-        site = self._site
+        site = self.site
         alone = Sample(0, report.measured_at, report.q_at, report.q, report.reference)
         found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
         if found:
@@ -325,7 +318,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
 
     @override
     def take(self, report: Report, *, now: float) -> None:
-        site = self._site
+        site = self.site
         usual = site.round_trips.quantile(0.95)
         if usual is not None:
             self._patience = 2.0 * self.config.beat + 1.2 * usual
@@ -342,7 +335,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         """Count a robot as halted that hears what is sent and yet carries nothing out."""
         had = self.log.acknowledged
         self.log.acknowledge(report.executed)
-        if self._site.halted or self.log.acknowledged == self.log.count:
+        if self.site.halted or self.log.acknowledged == self.log.count:
             self._waits = None
         elif self.log.acknowledged > had or self._waits is None:
             self._waits = now, now, 0.0
@@ -353,11 +346,11 @@ class VirtualArm(VirtualRobot[Orders, Report]):
             if self._waits[2] > self._stuck_after(STUCK):
                 waited = f"{heard - since:.1f} s before"
                 why = f"it hears the operator, but hasn't carried out a command that it was sent {waited}"
-                self._site.halt(Halt(HaltCause.STUCK, why))
+                self.site.halt(Halt(HaltCause.STUCK, why))
 
     def _watch_begin(self, report: Report, now: float) -> None:
         """Count a robot as halted that goes on saying that it follows an earlier epoch."""
-        site = self._site
+        site = self.site
         longest, known = site.round_trips.maximum, site.report
         if (
             report.epoch > site.epoch
@@ -412,14 +405,14 @@ class VirtualArm(VirtualRobot[Orders, Report]):
                 # No way keeps the limits from here; the next report finds the arm elsewhere.
                 return
             self.corrections.append(Correction(now, made.end, made.error, reason))
-            self._site.inform(lambda listener: listener.corrected(self.corrections[-1], truth))
+            self.site.inform(lambda listener: listener.corrected(self.corrections[-1], truth))
         else:
             self._compared = compared
 
     @override
     def restart(self, *, now: float) -> str:
         self.clock.set(now)
-        site, report = self._site, self._site.report
+        site, report = self.site, self.site.report
         if not site.halted:
             return "the robot follows: there's nothing to resume"
         if report is None or not report.halted:
@@ -452,5 +445,5 @@ def _differs(mine: Timeline, other: Timeline, t: float) -> bool:
     return bool(np.abs(mine.sample(moments) - other.sample(moments)).max() > _SAME)
 
 
-RobotLine: TypeAlias = SiteLine[OperatorSite[VirtualArm], Orders, Report]
+RobotLine: TypeAlias = SiteLine[VirtualArm, Orders, Report]
 """To an arm."""

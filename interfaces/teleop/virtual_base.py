@@ -11,21 +11,11 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
-from interfaces.messages.drive_sites import (
-    HALT,
-    ArcPacket,
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    RobotTask,
-    SensedPoints,
-    TaskReport,
-    arc_rows,
-)
+from interfaces.messages.control import SensedPoints
 from interfaces.messages.fields import Epoch
+from interfaces.messages.jobs import HALT, Doing, Errand, RobotTask, TaskReport
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import ArcPacket, DriveOrders, DriveReport, Sample, arc_rows
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.deviation import Deviation, PathDeviation
@@ -54,6 +44,9 @@ EPOCH_TIMEOUT: Final = 4.0
 class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     """A mobile robot that is driven by what is wished, and what the real one says. Times are the operator's [s]."""
 
+    engine: MobileEngine
+    site: OperatorSite[VirtualBase]
+
     def __init__(
         self,
         model: MobileModel,
@@ -71,7 +64,6 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
             around: Makes what it avoids, for a drive that begins at a posture.
         """
         self._model, self._around = model, around
-        self._site: OperatorSite[VirtualBase]
         self.steps = 0
         """Commands since the drive began."""
         self.epochs = 0
@@ -103,11 +95,13 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
             self._model, posture, Transport.DATAGRAMS, start=now, surroundings=self._around(posture)
         )
         self.architecture.listener = self._told
+        self.engine = self.architecture.engine
+        """What the commands of this drive make; the next drive has another one."""
         self.path = PathDeviation(now, posture)
         self.deviation = None
 
     def _told(self, deed: CommandRecord) -> None:
-        self._site.inform(lambda listener: listener.commanded(deed))
+        self.site.inform(lambda listener: listener.commanded(deed))
 
     def _put(self, posture: Posture, now: float, reason: str) -> None:
         """Begin a drive at a posture where the real robot is, and tell of it."""
@@ -116,17 +110,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         # Ids of commands are the session's, not a drive's.
         self.engine.count_from(newest)
         correction, truth = Correction(now, now, frozen_array(error), reason), self.engine.timeline
-        self._site.inform(lambda listener: listener.corrected(correction, truth))
-
-    @override
-    def join(self, site: OperatorSite[VirtualBase]) -> None:
-        self._site = site
-
-    @property
-    @override
-    def engine(self) -> MobileEngine:
-        """What the commands of this drive make; the next drive has another one."""
-        return self.architecture.engine
+        self.site.inform(lambda listener: listener.corrected(correction, truth))
 
     @property
     def period(self) -> float:
@@ -148,7 +132,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         """
         finite("v", v)
         finite("w", w)
-        site = self._site
+        site = self.site
         if site.gone:
             return not_following(site.gone).text
         if site.cause is HaltCause.BY_ITSELF and (v or w):
@@ -168,15 +152,15 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         self._later = ()
         if self.doing is not Doing.NOTHING:
             self._send(HALT)
-            self._site.halted = None
-        self._site.halt(Halt(HaltCause.STOPPED))
+            self.site.halted = None
+        self.site.halt(Halt(HaltCause.STOPPED))
 
     @property
     def doing(self) -> Doing:
         """What the real robot does by itself, as far as is known; something, while it may have been told to."""
-        report = self._site.report
+        report = self.site.report
         told = any(not errand.task.stops for errand in self._errands.waiting.values())
-        if told and self._site.cause is HaltCause.BY_ITSELF:
+        if told and self.site.cause is HaltCause.BY_ITSELF:
             return Doing.JOBS
         return Doing.NOTHING if report is None else report.doing
 
@@ -189,7 +173,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         Returns:
             Why not; empty if it's told to.
         """
-        site = self._site
+        site = self.site
         if site.gone:
             return not_following(site.gone).text
         if site.report is None:
@@ -226,7 +210,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     @override
     def done(self) -> bool:
         """Whether a drive that's over has come to its end: both robots stand, and the real one knows it."""
-        epoch, report = self._site.epoch, self._site.report
+        epoch, report = self.site.epoch, self.site.report
         if report is None or not self.stands:
             return self.stands
         knows = bool(report.halted) or (report.echo is not None and 0 < self._over <= report.echo[0])
@@ -237,12 +221,12 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     @override
     def shown(self, *, now: float) -> Array:
         """Where it's drawn: where the posture estimator has it, in an architecture that has one."""
-        doing = self._site.report is not None and self._site.report.doing is not Doing.NOTHING
+        doing = self.site.report is not None and self.site.report.doing is not Doing.NOTHING
         return np.array(self.architecture.estimated(now) if self.estimating and not doing else self.virtual(now))
 
     @override
     def restart(self, *, now: float) -> str:
-        site, report = self._site, self._site.report
+        site, report = self.site, self.site.report
         if report is None:
             return HaltCause.NOT_MET.value
         if site.halted is None:
@@ -271,7 +255,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @override
     def orders(self, number: int, *, now: float) -> DriveOrders | None:
-        site = self._site
+        site = self.site
         self._now = now
         packet: ArcPacket | None = None
         while now >= self.next_t - 1e-9:
@@ -316,13 +300,13 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         t = self.next_t
         wished = self._wish if t < self._until else self._braked()
         self.steps += 1
-        if self._site.halted and self.stands:
+        if self.site.halted and self.stands:
             return ArcPacket((), self.began)
         packet = self.architecture.drive(wished.v, wished.w, now=t)
         v, w = self.architecture.before
         x, y, theta = self.engine.posture(t).tolist()
         self.path.add(ArcSegment(t, self._model.period, (x, y, theta), v, w))
-        return ArcPacket((), self.began) if self._site.halted else packet
+        return ArcPacket((), self.began) if self.site.halted else packet
 
     def _braked(self) -> Drive:
         """The next command on the way to rest, along the arc."""
@@ -335,7 +319,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @override
     def hear(self, report: DriveReport, *, new: bool, now: float) -> bool:
-        site, known = self._site, self._site.report
+        site, known = self.site, self.site.report
         if not new:
             return False
         if known is None:
@@ -349,7 +333,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @override
     def take(self, report: DriveReport, *, now: float) -> None:
-        site = self._site
+        site = self.site
         self.tasks = self.tasks if report.tasks is None else report.tasks
         self.sight = self.sight if report.sight is None else report.sight
         if report.epoch != site.epoch:
@@ -372,11 +356,11 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     def virtual(self, now: float) -> Posture:
         """Where the virtual robot is [s]; of one that drives by itself, where it takes itself to be."""
-        report = self._site.report
+        report = self.site.report
         if report is not None and report.doing is not Doing.NOTHING:
             return report.posture
         return Posture(*self.engine.timeline.sample(now).tolist())
 
 
-DriveLine: TypeAlias = SiteLine[OperatorSite[VirtualBase], DriveOrders, DriveReport]
+DriveLine: TypeAlias = SiteLine[VirtualBase, DriveOrders, DriveReport]
 """To a mobile robot."""

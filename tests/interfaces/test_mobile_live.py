@@ -14,17 +14,17 @@ from interfaces import connect_mobile
 from interfaces.jobs import JobFile, RunnerConfig
 from interfaces.link import LinkConditions
 from interfaces.messages.control import Lease, Problem, Role
-from interfaces.messages.drive_sites import Doing
 from interfaces.messages.jobs import (
     ArmJob,
+    Doing,
     JobList,
     JobStage,
     ListCommand,
     MoveJob,
     OperatorLoss,
+    Tasks,
     WaitJob,
 )
-from interfaces.messages.mobile import Tasks
 from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.runtime.live.physics_body import PhysicsBody

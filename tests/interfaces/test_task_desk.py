@@ -8,9 +8,19 @@ from pathlib import Path
 import pytest
 
 from interfaces.jobs import JobFile
-from interfaces.messages.drive_sites import Doing, RobotTask
-from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
-from interfaces.messages.mobile import Plan, Tasks
+from interfaces.messages.control import Plan
+from interfaces.messages.jobs import (
+    Doing,
+    JobList,
+    JobStage,
+    ListCommand,
+    MessageJob,
+    MoveJob,
+    RobotTask,
+    Tasks,
+    VoiceJob,
+    WaitJob,
+)
 from interfaces.runtime.live.base_twins import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.task_desk import TOO_LONG, TaskDesk
 from interfaces.stream.codec import News

@@ -7,9 +7,8 @@ import math
 import pytest
 
 from interfaces.link import LinkConditions
-from interfaces.messages.control import PROTOCOL, Attached
-from interfaces.messages.drive_sites import DriveReport
-from interfaces.messages.mobile import Postures
+from interfaces.messages.control import PROTOCOL, Attached, Postures
+from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.base_twins import BaseTwins
 from robots import load
 from robots.mobile.robot import place

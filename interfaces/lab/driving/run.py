@@ -16,7 +16,7 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
-from interfaces.messages.drive_sites import ArcPacket
+from interfaces.messages.sites import ArcPacket
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Row, Witness, row_of
 from interfaces.teleop.architectures import (
     ArchitectureOperatorSite,

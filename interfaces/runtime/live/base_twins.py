@@ -11,9 +11,9 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import LinkConditions
-from interfaces.messages.control import MOST_MESSAGES, Attached
-from interfaces.messages.drive_sites import Doing, DriveReport
-from interfaces.messages.mobile import Postures
+from interfaces.messages.control import MOST_MESSAGES, Attached, Postures
+from interfaces.messages.jobs import Doing
+from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.twins import LiveTwins
 from interfaces.stream.driving import DriveSite
 from interfaces.stream.meshcat import Committed, TwinScene

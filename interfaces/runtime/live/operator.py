@@ -16,9 +16,7 @@ from interfaces.jobs import JobFile
 from interfaces.link import LinkConditions
 from interfaces.media import CameraConfig
 from interfaces.messages.control import Role
-from interfaces.messages.drive_sites import RobotTask
-from interfaces.messages.jobs import ArmJob
-from interfaces.messages.mobile import Tasks
+from interfaces.messages.jobs import ArmJob, RobotTask, Tasks
 from interfaces.recording.live import LiveRecording
 from interfaces.runtime.live.base_twins import BaseTwins
 from interfaces.runtime.live.devices import MediaDevice, OperatorDevice

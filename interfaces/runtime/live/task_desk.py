@@ -13,18 +13,21 @@ from typing_extensions import override
 
 from interfaces.jobs import JobFile, JobRunner, carried_over, digest, dry_run, written_jobs
 from interfaces.jobs.runner import EMPTY, RUNS
-from interfaces.messages.drive_sites import Doing, RobotTask, SensedPoints, TaskReport
+from interfaces.messages.control import Plan, Seen, SensedPoints
 from interfaces.messages.jobs import (
     LONGEST_NAME,
     MOST_PLACES,
     ArmJob,
+    Doing,
     Forecast,
     JobList,
     ListCommand,
     OperatorLoss,
     Progress,
+    RobotTask,
+    TaskReport,
+    Tasks,
 )
-from interfaces.messages.mobile import Plan, Seen, Tasks
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.stream.codec import News
 from interfaces.teleop.halt import HaltCause

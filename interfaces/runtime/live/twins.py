@@ -12,9 +12,8 @@ from typing_extensions import override
 
 from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
-from interfaces.messages.control import MOST_MESSAGES, Attached, State
+from interfaces.messages.control import MOST_MESSAGES, Attached, Postures, State
 from interfaces.messages.fields import Epoch
-from interfaces.messages.mobile import Postures
 from interfaces.messages.sites import Report
 from interfaces.runtime.live.process import warm
 from interfaces.stream.driving import DriveSite
@@ -43,7 +42,7 @@ class LiveTwins(Protocol[V]):
     """Name of the room that both drive in; empty for arms."""
     operator: OperatorSite[V]
     """The operator's site."""
-    line: SiteLine[OperatorSite[V], Any, Any]
+    line: SiteLine[V, Any, Any]
     """To the real one."""
     site: Site | DriveSite
     """What a hub serves."""

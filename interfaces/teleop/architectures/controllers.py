@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
-from interfaces.messages.drive_sites import ArcPacket
+from interfaces.messages.sites import ArcPacket
 from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig

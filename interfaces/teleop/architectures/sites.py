@@ -8,8 +8,8 @@ from typing import Protocol
 
 from interfaces.link.conditions import Service
 from interfaces.link.delivery import Incoming, Outgoing
-from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
 from interfaces.messages.recording import CommandRecord
+from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.following import PositionSource

@@ -7,15 +7,16 @@ import math
 import pytest
 
 from interfaces.jobs import dry_run
-from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import (
     ArmJob,
+    Doing,
     Forecast,
     JobList,
     JobStage,
     ListCommand,
     MessageJob,
     MoveJob,
+    RobotTask,
     VoiceJob,
     WaitJob,
 )

@@ -17,24 +17,15 @@ from interfaces.engine_server.site import Site
 from interfaces.jobs import digest
 from interfaces.link import ClockSync, RoundTrip
 from interfaces.messages import control as c
-from interfaces.messages import mobile as b
+from interfaces.messages import jobs as j
 from interfaces.messages.compact import CompactDecoder, CompactEncoder, CompactFrame, packed
-from interfaces.messages.control import LinkFigures, Ping, Pong
-from interfaces.messages.drive_sites import (
-    HALT,
-    Doing,
-    DriveOrders,
-    DriveReport,
-    Errand,
-    RobotTask,
-    SensedPoints,
-    TaskReport,
-    arc_rows,
-)
-from interfaces.messages.drive_sites import ArchitectureReport as Followed
+from interfaces.messages.control import LinkFigures, Ping, Pong, SensedPoints
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import (
+    HALT,
     ArmJob,
+    Doing,
+    Errand,
     JobForecast,
     JobList,
     JobProgress,
@@ -44,10 +35,13 @@ from interfaces.messages.jobs import (
     MoveJob,
     OperatorLoss,
     Progress,
+    RobotTask,
+    TaskReport,
     VoiceJob,
     WaitJob,
 )
-from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
+from interfaces.messages.sites import ArchitectureReport as Followed
+from interfaces.messages.sites import DriveOrders, DriveReport, LogEntry, Orders, PlanPart, Report, Sample, arc_rows
 from interfaces.stream import Encoding, encode
 from robots import puma560
 from robots.onboard.driving import Drive, Posture
@@ -152,16 +146,16 @@ def values() -> dict[str, Any]:
             c.PROTOCOL, "ipr", frozen_array([1.5, 3.0, 0.25]), "halt", 0.5, None, "xyz", "vrs 0.1.0", max_age=0.5,
             architecture="timeline", room="Empty room",
         ),
-        "mobile welcome": b.MobileWelcome(
+        "mobile welcome": c.MobileWelcome(
             c.PROTOCOL, "abc", c.Role.OPERATOR, "ipr", DriveLimits(0.5, 0.75, 0.52, 2.6), 0.1, 0.3, 2.5, held, 2.0,
             False, "xyz", "vrs 0.1.0", room="Empty room",
         ),
-        "postures": b.Postures(
+        "postures": c.Postures(
             31, 2.5, Posture(1.75, 3.0, 0.5), Drive(0.3, -0.1), Posture(1.76, 3.01, 0.5), 2.25,
             Posture(1.7, 3.0, 0.4), Drive(0.28, -0.05), -0.2, False, 0.002, 0.31, 7_730_941_132_801, True, "", 2,
             0.41, ((2.0, 2.25), (2.05, None)),
         ),
-        "postures before the real robot is met": b.Postures(
+        "postures before the real robot is met": c.Postures(
             1, 0.5, Posture(1.5, 3.0, 0.0), Drive(0.0, 0.0), Posture(1.5, 3.0, 0.0), connected=False,
             halted="the robot hasn't been met yet",
         ),
@@ -187,19 +181,19 @@ def values() -> dict[str, Any]:
             ),
             sight=SensedPoints(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
         ),
-        "task: a goal": b.TaskOrder(7, RobotTask(go=Goal(4.0, 1.5)), LEASE),
-        "task: a list": b.TaskOrder(8, RobotTask(jobs=JOBS), LEASE),
-        "task: run it": b.TaskOrder(9, RobotTask(do=ListCommand.RUN), LEASE),
-        "task: try it": b.TaskOrder(10, RobotTask(do=ListCommand.DRY_RUN), LEASE),
-        "tasks": b.Tasks(
+        "task: a goal": j.TaskOrder(7, RobotTask(go=Goal(4.0, 1.5)), LEASE),
+        "task: a list": j.TaskOrder(8, RobotTask(jobs=JOBS), LEASE),
+        "task: run it": j.TaskOrder(9, RobotTask(do=ListCommand.RUN), LEASE),
+        "task: try it": j.TaskOrder(10, RobotTask(do=ListCommand.DRY_RUN), LEASE),
+        "tasks": j.Tasks(
             Doing.JOBS, JourneyState.DRIVING, "", Goal(4.0, 1.5, 0.25), ((1.5, 3.0), (4.0, 1.5)), 2.5, JOBS,
             PROGRESS,
             (JobForecast(1, 0.0, 8.25, ((1.5, 3.0), (4.0, 1.5))), JobForecast(2, 8.25, None)),
             OperatorLoss.STOP, "Look", "", answers=9,
         ),
-        "tasks before the robot is met": b.Tasks(problem="jobs.json: is no list of jobs"),
-        "seen": b.Seen(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
-        "plan": b.Plan(
+        "tasks before the robot is met": j.Tasks(problem="jobs.json: is no list of jobs"),
+        "seen": c.Seen(12.5, ((2.0, 3.0), (2.5, 3.25)), (0.0004, 0.0, 0.0009)),
+        "plan": c.Plan(
             (6.0, 4.0), (((0.0, 0.0), (6.0, 0.0), (6.0, 0.1), (0.0, 0.1)),), ((3.0, 2.0),), (0.2, 0.32, 0.45),
         ),
         "drive report": DriveReport(

@@ -18,12 +18,10 @@ from hypothesis import strategies as st
 from interfaces import messages as m
 from interfaces.messages import control as c
 from interfaces.messages.commands import portable
-from interfaces.messages.control import ProblemCode, ProtocolError
-from interfaces.messages.drive_sites import DriveOrders, DriveReport, Errand, RobotTask
+from interfaces.messages.control import MobileWelcome, Plan, Postures, ProblemCode, ProtocolError, Seen
 from interfaces.messages.fields import LONGEST_TEXT, MOST_NAMES, Epoch
-from interfaces.messages.jobs import JobForecast
-from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.messages.sites import Orders, Report
+from interfaces.messages.jobs import Errand, JobForecast, RobotTask, TaskOrder, Tasks
+from interfaces.messages.sites import DriveOrders, DriveReport, Orders, Report
 from interfaces.stream import LARGEST, Encoding, SharedEncoder, decode, encode
 from interfaces.stream.codec import KINDS, TYPES
 from robots.onboard.driving import Drive, Posture

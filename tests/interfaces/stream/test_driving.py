@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
-from interfaces.messages.control import Problem, Welcome
-from interfaces.messages.drive_sites import RobotTask
-from interfaces.messages.mobile import MobileWelcome, Postures, Seen, Tasks
+from interfaces.messages.control import MobileWelcome, Postures, Problem, Seen, Welcome
+from interfaces.messages.jobs import RobotTask, Tasks
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.messages.drive_sites import DriveOrders
 from interfaces.messages.fields import Epoch
+from interfaces.messages.sites import DriveOrders
 from interfaces.teleop.architectures import ARCHITECTURES
 from interfaces.teleop.following_base import TOO_FAR
 from interfaces.teleop.halt import Halt, HaltCause

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import DriveReport
+from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL

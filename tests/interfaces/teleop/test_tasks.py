@@ -9,10 +9,12 @@ import pytest
 
 from interfaces.jobs import RunnerConfig
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.messages.drive_sites import HALT, Doing, DriveOrders, Errand, RobotTask
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import (
+    HALT,
     ArmJob,
+    Doing,
+    Errand,
     Job,
     JobList,
     JobStage,
@@ -21,9 +23,11 @@ from interfaces.messages.jobs import (
     MoveJob,
     OperatorLoss,
     Progress,
+    RobotTask,
     VoiceJob,
     WaitJob,
 )
+from interfaces.messages.sites import DriveOrders
 from interfaces.teleop.halt import HaltCause
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState

@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import DriveReport
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import Sample
+from interfaces.messages.sites import DriveReport, Sample
 from interfaces.teleop import Correction, SiteObserver
 from interfaces.teleop.architectures.compositions import ESTIMATING
 from tests.interfaces.teleop.rig import MODEL, Rig
@@ -63,6 +62,8 @@ def test_a_listener_hears_all_that_makes_the_timeline_in_session_time() -> None:
     assert [drive[1].start for drive in notes.drives] == [drive[0].t for drive in notes.drives]
     for correction, truth, deeds in (one, two):
         again = Engine(MODEL, timeline=truth, clock=ManualClock(correction.t))
+        # Ids of commands are the session's, not a drive's.
+        again.count_from(deeds[0].receipt.command_id - 1 if deeds[0].receipt else 0)
         for deed in deeds:
             assert deed.at >= correction.t
             again.clock.set(deed.at)

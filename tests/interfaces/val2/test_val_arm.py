@@ -7,8 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import Doing, RobotTask
-from interfaces.messages.jobs import ArmJob, JobList, JobStage, ListCommand, WaitJob
+from interfaces.messages.jobs import ArmJob, Doing, JobList, JobStage, ListCommand, RobotTask, WaitJob
 from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
 from tests.interfaces.teleop.rig import Rig

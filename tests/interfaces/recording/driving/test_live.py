@@ -12,8 +12,9 @@ import pytest
 
 from interfaces.cli.main import exit_status
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-from interfaces.messages.drive_sites import DriveReport, RobotTask
+from interfaces.messages.jobs import RobotTask
 from interfaces.messages.recording import Placement
+from interfaces.messages.sites import DriveReport
 from interfaces.recording import Recording, open_recording
 from interfaces.recording.figures import summary
 from interfaces.recording.live import LiveRecorder, LiveRecording

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from interfaces.messages.drive_sites import ArcPacket
+from interfaces.messages.sites import ArcPacket
 from interfaces.teleop.architectures import ARCHITECTURES, Constants, DriveController, controller
 from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError

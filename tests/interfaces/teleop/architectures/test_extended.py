@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from interfaces.lab.driving.run import run
-from interfaces.messages.drive_sites import ArchitectureReport
+from interfaces.messages.sites import ArchitectureReport
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import echoes_of, grid_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.messages.drive_sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket
 from interfaces.teleop.architectures import ArchitectureOperatorSite, ArchitectureRobotSite, Transport
 from robots import ipr
 from robots.onboard.driving import IPR_LIMITS, STAND, Posture
