@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import pytest
-from robots.ipr.robot import place
 
 from interfaces.link import LinkConditions
 from interfaces.messages.control import PROTOCOL, Attached
@@ -13,6 +12,7 @@ from interfaces.messages.drive_sites import DriveReport
 from interfaces.messages.mobile import Postures
 from interfaces.runtime.live.base_twins import BaseTwins
 from robots import load
+from robots.mobile.robot import place
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.model import frozen_array
 
