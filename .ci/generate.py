@@ -73,7 +73,7 @@ def _within(kind: kinds.Type) -> Iterator[MessageDescription]:
 # The script.
 
 HEAD = """// Generated from the definitions of messages by `{command}`: don't edit.
-// What may cross between a page and the server (docs/protocol.md), and what checks it where it comes in.
+// What may come into a page (docs/protocol.md), and what checks it there: a function a message, a line a field.
 
 /** The ends of whole numbers and of real ones: JSON has no infinity. */
 const WHOLE = 2 ** 63;
@@ -86,37 +86,60 @@ function fail(where, wanted) {{
   throw new Misfit(`${{where}} isn't ${{wanted}}`);
 }}
 
+// Each looks at what stands in a place, and gives it back.
+
 function whole(x, low, high, where) {{
   if (!Number.isInteger(x) || x < low || x > high) fail(where, `a whole number from ${{low}} to ${{high}}`);
+  return x;
 }}
 
 function real(x, low, high, where) {{
   if (typeof x !== "number" || !(x >= low && x <= high)) fail(where, `a number from ${{low}} to ${{high}}`);
+  return x;
 }}
 
 function text(x, least, most, where) {{
   if (typeof x !== "string" || x.length < least || (x.length > most && [...x].length > most))
     fail(where, `a text of ${{least}} to ${{most}} characters`);
+  return x;
 }}
 
 function like(x, pattern, where) {{
-  if (typeof x !== "string" || !pattern.test(x)) fail(where, `a text like ${{pattern}}`);
+  return typeof x === "string" && pattern.test(x) ? x : fail(where, `a text like ${{pattern}}`);
 }}
 
 function flag(x, where) {{
-  if (typeof x !== "boolean") fail(where, "true or false");
+  return typeof x === "boolean" ? x : fail(where, "true or false");
 }}
 
-function word(x, known, where) {{
-  if (!known.has(x)) fail(where, `one of ${{[...known].join(", ")}}`);
+/** One of some words; `newer`, where it's given, stands for any other. */
+function word(x, known, where, newer) {{
+  if (known.has(x)) return x;
+  return newer !== undefined && typeof x === "string" ? newer : fail(where, `one of ${{[...known].join(", ")}}`);
 }}
 
-function list(x, least, most, where) {{
+function list(x, least, most, where, check) {{
   if (!Array.isArray(x) || x.length < least || x.length > most) fail(where, `an array of ${{least}} to ${{most}}`);
+  if (check !== undefined) for (const one of x) check(one);
+  return x;
 }}
 
-function map(x, where) {{
+function numbers(x, least, most, low, high, where) {{
+  list(x, least, most, where);
+  for (const one of x) real(one, low, high, where);
+  return x;
+}}
+
+function tuple(x, where, ...checks) {{
+  list(x, checks.length, checks.length, where);
+  for (let i = 0; i < checks.length; i++) checks[i](x[i]);
+  return x;
+}}
+
+function map(x, where, check) {{
   if (typeof x !== "object" || x === null || Array.isArray(x)) fail(where, "a map");
+  if (check !== undefined) for (const one of Object.values(x)) check(one);
+  return x;
 }}
 """
 LEASED = """
@@ -162,25 +185,19 @@ export function decode(frame, tell = console.warn) {{
 
 def script(found: Iterable[MessageDescription]) -> str:
     """The module that checks what comes into a page."""
-    all_messages = list(found)
-    coming = [m for m in all_messages if m.sender in {Party.SERVER, Party.EITHER}]
-    shown = [m for m in all_messages if m.sender not in {Party.SITE, Party.ROBOT}]
-    pieces = [HEAD.format(command=COMMAND)]
-    pieces += [_typedef(part) for part in _each(shown)]
+    known = list(found)
+    coming = [one for one in known if one.sender in {Party.SERVER, Party.EITHER}]
     checks = _each(coming)
-    sets = dict.fromkeys(known for part in checks for field in part.fields for known in _choices(field.type))
-    names = {known: f"WORDS_{number}" for number, known in enumerate(sets, 1)}
-    pieces.append("\n".join(f"const {name} = new Set({json.dumps(known)});" for known, name in names.items()))
-    pieces += [_check(part, names) for part in checks]
+    choices = {choice.cls: choice for part in checks for field in part.fields for choice in _choices(field.type)}
+    pieces = [HEAD.format(command=COMMAND)]
+    pieces += [f"const {_set(one)} = new Set({json.dumps(words(one))});" for one in choices.values()]
+    pieces += [_check(part) for part in checks]
     rows = "\n".join(f"  [{json.dumps(message.tag)}, {_function(message)}]," for message in coming)
-    pieces.append(f"const CHECKS = new Map([\n{rows}\n]);")
-    leased = [message.tag for message in shown if message not in coming and "epoch" in _names(message)]
+    pieces.append(f"\nconst CHECKS = new Map([\n{rows}\n]);")
+    sent = [one for one in known if one.sender not in {Party.SITE, Party.ROBOT} and one not in coming]
+    leased = [one.tag for one in sent if any(field.name == "epoch" for field in one.fields)]
     pieces.append(LEASED.format(json.dumps(leased)))
     return "\n".join(pieces) + TAIL.format()
-
-
-def _names(message: MessageDescription) -> set[str]:
-    return {field.name for field in message.fields}
 
 
 def _each(found: Iterable[MessageDescription]) -> list[MessageDescription]:
@@ -188,67 +205,30 @@ def _each(found: Iterable[MessageDescription]) -> list[MessageDescription]:
     return list({part.name: part for message in found for part in parts(message)}.values())
 
 
-def _choices(kind: kinds.Type) -> Iterator[tuple[Any, ...]]:
+def _choices(kind: kinds.Type) -> Iterator[kinds.EnumType]:
     for one in alternatives(kind):
-        if isinstance(one, kinds.EnumType | kinds.LiteralType):
-            yield words(one)
+        if isinstance(one, kinds.EnumType):
+            yield one
         for name in ("item_type", "item_types", "value_type"):
             inner = getattr(one, name, ())
             for part in inner if isinstance(inner, tuple) else (inner,):
                 yield from _choices(part)
 
 
+def _set(choice: kinds.EnumType) -> str:
+    """What the script calls the words of a choice: `LinkLoss` is LINK_LOSS there."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", choice.cls.__name__).upper()
+
+
 def _function(message: MessageDescription) -> str:
     return f"check{message.name}"
 
 
-def _typedef(message: MessageDescription) -> str:
-    about = f"{message.sender}: {_without_sender(message.text)}" if message.sender else message.text
-    if message.is_array:
-        inner = ", ".join(_script_type(field.type, field.nullable) for field in message.fields)
-        return f"/** {about} @typedef {{[{inner}]}} {message.name} */"
-    lines = [f"/**\n * {about}\n * @typedef {{object}} {message.name}"]
-    if message.tag:
-        lines.append(f' * @property {{"{message.tag}"}} {message.tag_field}')
-    for field in message.fields:
-        name = field.name if field.required else f"[{field.name}]"
-        text = f" {field.text}" if field.text else ""
-        lines.append(f" * @property {{{_script_type(field.type, field.nullable)}}} {name} {_what(field)}.{text}")
-    return "\n".join(lines) + "\n */"
-
-
-def _without_sender(text: str) -> str:
-    return re.sub(r"^(Client|Server|Servlet|Holder|Admin|Robot|Either side): ", "", text)
-
-
-def _script_type(kind: kinds.Type, nullable: bool) -> str:
-    found = dict.fromkeys(_one_script_type(one) for one in alternatives(kind))
-    return "|".join([*found, *(["null"] if nullable else [])])
-
-
-def _one_script_type(kind: kinds.Type) -> str:
-    match kind:
-        case kinds.IntType() | kinds.FloatType():
-            return "number"
-        case kinds.StrType():
-            return "string"
-        case kinds.BoolType():
-            return "boolean"
-        case kinds.EnumType() | kinds.LiteralType():
-            return "|".join(json.dumps(one) for one in words(kind))
-        case kinds.ListType(item) | kinds.VarTupleType(item):
-            return f"Array<{_script_type(item, is_nullable(item))}>"
-        case kinds.TupleType(items):
-            return f"[{', '.join(_script_type(item, is_nullable(item)) for item in items)}]"
-        case kinds.DictType(_, item):
-            return f"Object<string, {_script_type(item, is_nullable(item))}>"
-        case _:
-            return described(kind).name
-
-
-def _check(message: MessageDescription, names: dict[tuple[Any, ...], str]) -> str:
+def _check(message: MessageDescription) -> str:
     label = message.tag or message.name
-    lines = [f"function {_function(message)}(m) {{"]
+    sender = f"{message.sender}: " * bool(message.sender)
+    about = re.sub(rf"^{sender}", "", message.text)
+    lines = [f"\n/** {sender}{about} */", f"function {_function(message)}(m) {{"]
     if message.is_array:
         least = sum(field.required for field in message.fields)
         most = "Infinity" if message.is_open else len(message.fields)
@@ -260,42 +240,34 @@ def _check(message: MessageDescription, names: dict[tuple[Any, ...], str]) -> st
         lines.append(f'  if ({at} !== undefined && {at} !== {tag}) fail("{label}", {tag});')
     for number, field in enumerate(message.fields):
         at = f"m[{number}]" if message.is_array else f"m.{field.name}"
-        lines += [f"  {line}" for line in _field_check(field, at, f"{label}.{field.name}", names)]
-    return "\n".join([*lines, "}"])
+        first, *more = _field_check(field, at, f"{label}.{field.name}").split("\n")
+        lines += [f"  {first}{f' // {field.text}' * bool(field.text)}", *(f"  {line}" for line in more)]
+    return "\n".join([*lines, "  return m;", "}"])
 
 
-def _field_check(field: FieldDescription, at: str, where: str, names: dict[tuple[Any, ...], str]) -> list[str]:
-    check = list(_place_check(field.type, at, where, names, 0))
-    if field.required:
-        return _guarded(f"if ({at} !== null)", check) if field.nullable else check
+def _field_check(field: FieldDescription, at: str, where: str) -> str:
+    """What checks a field, and fills it in where it's left out."""
+    check = _place_check(field.type, at, where)
     missing = f"{at} === undefined" + f" || {at} === null" * field.null_is_absence
-    default = re.sub(r"[A-Za-z_]\w*", r"m.\g<0>", field.computed) or json.dumps(field.default)
-    if isinstance(field.default, dict):
-        return [f"if ({missing}) {at} = {default};", *check]
-    if field.nullable and not field.null_is_absence:
-        return [f"if ({missing}) {at} = {default};", *_guarded(f"else if ({at} !== null)", check)]
+    if field.required:
+        return f"if ({at} !== null) {check};" if field.nullable else f"{check};"
     if "[" in at:
         # An array that ends before stays as it is.
-        return _guarded(f"if ({at} !== undefined && {at} !== null)", check)
-    return [f"if ({missing}) {at} = {default};", *_guarded("else", check)]
+        return f"if (!({missing})) {check};"
+    if isinstance(field.default, dict):
+        return f"{at} = {_place_check(field.type, f'{missing} ? {json.dumps(field.default)} : {at}', where)};"
+    default = re.sub(r"[A-Za-z_]\w*", r"m.\g<0>", field.computed) or json.dumps(field.default)
+    nothing = f"{at} === null ? null : " * (field.nullable and not field.null_is_absence)
+    return f"{at} = {missing} ? {default} : {nothing}{check};"
 
 
-def _guarded(head: str, check: list[str]) -> list[str]:
-    """Lines that are run where their head says."""
-    return [f"{head} {check[0]}"] if len(check) == 1 else [f"{head} {{", *(f"  {line}" for line in check), "}"]
-
-
-def _place_check(
-    kind: kinds.Type, at: str, where: str, names: dict[tuple[Any, ...], str], depth: int
-) -> Iterator[str]:
-    found = alternatives(kind)
-    if len(found) == 1:
-        yield from _one_check(found[0], at, where, names, depth)
-        return
-    for number, one in enumerate(found):
-        head = f"{'else if' if number else 'if'} ({_looks_like(one, at)})"
-        yield from [f"{head} {{", *(f"  {line}" for line in _one_check(one, at, where, names, depth)), "}"]
-    yield f'else fail({json.dumps(where)}, "of a kind that is known");'
+def _place_check(kind: kinds.Type, at: str, where: str) -> str:
+    """What checks what stands in a place, and gives it back."""
+    *others, last = alternatives(kind)
+    if not others:
+        return _one_check(last, at, where)
+    tries = [f"{_looks_like(one, at)} ? {_one_check(one, at, where)}" for one in (*others, last)]
+    return "\n  : ".join([*tries, f'fail({json.dumps(where)}, "of a kind that is known")'])
 
 
 def _looks_like(kind: kinds.Type, at: str) -> str:
@@ -312,53 +284,47 @@ def _looks_like(kind: kinds.Type, at: str) -> str:
         case kinds.ListType() | kinds.VarTupleType() | kinds.TupleType():
             return f"Array.isArray({at})"
     tag, tag_field = getattr(kind, "tag", None), getattr(kind, "tag_field", None)
-    alike = f'typeof {at} === "object" && {at} !== null'
-    return alike if tag is None else f"{alike} && {at}.{tag_field} === {json.dumps(tag)}"
+    return (
+        f'typeof {at} === "object" && {at} !== null' if tag is None else f"{at}?.{tag_field} === {json.dumps(tag)}"
+    )
 
 
-def _one_check(
-    kind: kinds.Type, at: str, where: str, names: dict[tuple[Any, ...], str], depth: int
-) -> Iterator[str]:
+def _one_check(kind: kinds.Type, at: str, where: str) -> str:
     place = json.dumps(where)
     match kind:
         case kinds.IntType():
-            yield f"whole({at}, {_ends(kind)}, {place});"
+            return f"whole({at}, {_ends(kind)}, {place})"
         case kinds.FloatType():
-            yield f"real({at}, {_ends(kind)}, {place});"
+            return f"real({at}, {_ends(kind)}, {place})"
         case kinds.StrType(pattern=str(pattern)):
-            yield f"like({at}, /{pattern.replace(chr(92) + 'A', '^').replace(chr(92) + 'Z', '$')}/, {place});"
+            return f"like({at}, /{pattern.replace(chr(92) + 'A', '^').replace(chr(92) + 'Z', '$')}/, {place})"
         case kinds.StrType():
-            yield f"text({at}, {_sizes(kind)}, {place});"
+            return f"text({at}, {_sizes(kind)}, {place})"
         case kinds.BoolType():
-            yield f"flag({at}, {place});"
-        case kinds.EnumType() if (other := fallback(kind)) is not None:
-            yield f'if (typeof {at} === "string" && !{names[words(kind)]}.has({at})) {at} = {json.dumps(other)};'
-            yield f"word({at}, {names[words(kind)]}, {place});"
-        case kinds.EnumType() | kinds.LiteralType():
-            yield f"word({at}, {names[words(kind)]}, {place});"
+            return f"flag({at}, {place})"
+        case kinds.EnumType():
+            newer = f", {json.dumps(fallback(kind))}" * (fallback(kind) is not None)
+            return f"word({at}, {_set(kind)}, {place}{newer})"
+        case kinds.ListType(kinds.FloatType() as item) | kinds.VarTupleType(kinds.FloatType() as item):
+            return f"numbers({at}, {_sizes(kind)}, {_ends(item)}, {place})"
         case kinds.ListType(item) | kinds.VarTupleType(item):
-            yield f"list({at}, {_sizes(kind)}, {place});"
-            yield from _each_check(item, f"of {at}", where, names, depth)
+            return f"list({at}, {_sizes(kind)}, {place}, {_item_check(item, where)})"
+        case kinds.TupleType((kinds.FloatType() as item, *others) as items) if all(o == item for o in others):
+            return f"numbers({at}, {len(items)}, {len(items)}, {_ends(item)}, {place})"
         case kinds.TupleType(items):
-            yield f"list({at}, {len(items)}, {len(items)}, {place});"
-            for number, item in enumerate(items):
-                check = list(_place_check(item, f"{at}[{number}]", where, names, depth))
-                yield from _guarded(f"if ({at}[{number}] !== null)", check) if is_nullable(item) else check
+            checks = ", ".join(_item_check(item, where) for item in items)
+            return f"tuple({at}, {place}, {checks})"
         case kinds.DictType(_, item):
-            yield f"map({at}, {place});"
-            yield from _each_check(item, f"of Object.values({at})", where, names, depth)
-        case _:
-            yield f"{_function(described(kind))}({at});"
+            return f"map({at}, {place}, {_item_check(item, where)})"
+    return f"{_function(described(kind))}({at})"
 
 
-def _each_check(
-    item: kinds.Type, of: str, where: str, names: dict[tuple[Any, ...], str], depth: int
-) -> Iterator[str]:
-    inner = "xyzuvw"[depth]
-    check = list(_place_check(item, inner, where, names, depth + 1))
-    if is_nullable(item):
-        check = _guarded(f"if ({inner} !== null)", check)
-    yield from _guarded(f"for (const {inner} {of})", check)
+def _item_check(item: kinds.Type, where: str) -> str:
+    """A function that checks what stands in a list or a map."""
+    check = _place_check(item, "x", where)
+    if isinstance(item, Described):
+        return _function(described(item))
+    return f"(x) => {'x === null ? x : ' * is_nullable(item)}{check}"
 
 
 def _ends(kind: kinds.IntType | kinds.FloatType) -> str:

@@ -88,7 +88,7 @@ async def live(seed: int) -> tuple[float, ...]:
         await robot.ready()
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(PROFILE)))
         at = f"ws://127.0.0.1:{port}/site"
-        operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, at, way, seed=seed), Access(free=OPEN))
+        operator = LiveOperator(LiveOperatorConfig(ROBOT, at, way, seed=seed, q=NOMINAL), Access(free=OPEN))
         await stack.enter_async_context(operator.running())
         site, clock = operator.operator, operator.clock
         async with asyncio.timeout(20):
@@ -102,7 +102,7 @@ async def live(seed: int) -> tuple[float, ...]:
         rows: list[tuple[float, list[float], list[float]]] = []
         while clock.now() < begin + LONG:
             while waiting and clock.now() >= waiting[0][0]:
-                site.execute(waiting.pop(0)[1], now=clock.now())
+                site.robot.execute(waiting.pop(0)[1], now=clock.now())
             facts = robot.health()
             reference = body.host.reference(np.array([facts["measured_at"]])).q[0]
             t_now = facts["measured_at"] + apart
@@ -118,7 +118,7 @@ async def live(seed: int) -> tuple[float, ...]:
                 f"live run {seed}: {site.halted}, {body.faults} faults, {robot.health()['timer_late']:.3f} s late"
             )
         real = np.array([row[1] for row in rows])[keep]
-        return figures(t[keep], site.engine.timeline.sample(t[keep]), real, asked[keep])
+        return figures(t[keep], site.robot.engine.timeline.sample(t[keep]), real, asked[keep])
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from interfaces.lab.localization.trial import PostureSource, body_of, furnished, setting, wander
-from robots.ipr.floor_plan import plan_map
+from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.global_localization import locate
 from robots.onboard.laser import LaserScan

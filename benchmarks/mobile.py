@@ -14,9 +14,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
-from robots.ipr.body import MobileBody
-from robots.ipr.chassis import Senses, SonarModel
-from robots.ipr.robot import BareBody, MobileRobot
+from robots.ipr.parameters import IPR, MICRO
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import Senses, SonarModel
+from robots.mobile.robot import BareBody, MobileRobot
 
 if TYPE_CHECKING:
     from benchmarks.results import Part
@@ -46,15 +47,15 @@ def measure(blocks: int = 40) -> dict[str, float]:
     blind = Senses(sonar=None, camera=None)
     found: dict[str, list[float]] = {}
     with (
-        MobileBody("ipr", START, room="furnished", rng=1) as simulated,
-        MobileBody("micro", START, room="furnished", rng=1) as micro,
-        MobileBody("ipr", START, room="furnished", rng=1) as stepped,
+        MobileBody(IPR, START, room="furnished", rng=1) as simulated,
+        MobileBody(MICRO, START, room="furnished", rng=1) as micro,
+        MobileBody(IPR, START, room="furnished", rng=1) as stepped,
     ):
         bodies: dict[str, MobileRobot] = {
             "simulated": simulated,
             "micro": micro,
-            "bare": BareBody("ipr", START, room="furnished", rng=1, senses=blind),
-            "bare_sonar": BareBody("ipr", START, room="furnished", rng=1, senses=sonar),
+            "bare": BareBody(IPR, START, room="furnished", rng=1, senses=blind),
+            "bare_sonar": BareBody(IPR, START, room="furnished", rng=1, senses=sonar),
         }
         actions = {name: partial(circle, body) for name, body in bodies.items()}
         actions["pybullet"] = partial(bare_steps, stepped, PERIODS * 24)

@@ -10,7 +10,7 @@ from benchmarks.moves import LIMITS, MODEL
 from benchmarks.results import Bar, Cost, Part, Result
 from interfaces.link import Conditions, LinkConditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite
+from interfaces.teleop import FollowingArm, OperatorSite, VirtualArm
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.commands import Command
 
@@ -52,12 +52,12 @@ def part() -> Part:
 def session(profile: str, length: float) -> tuple[Laboratory, int, int]:
     """Both sites with what the operator will do; how many moves and steering inputs."""
     rng = np.random.default_rng(0)
-    operator, robot = OperatorSite(MODEL, NOMINAL, now=0.0), RobotSite(MODEL, NOMINAL, now=0.0)
+    operator, robot = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), FollowingArm(MODEL, NOMINAL, now=0.0)
     conditions = Conditions(delay=delay_profile(profile), service=Service.IN_ORDER)
     lab = Laboratory(operator, robot, LinkConditions.symmetric(conditions), rng)
 
     def give(t: float, command: Command) -> None:
-        lab.schedule(t, lambda now: operator.execute(command, now=now))
+        lab.schedule(t, lambda now: operator.robot.execute(command, now=now))
 
     t, moves, inputs = 1.0, 0, 0
     while t < length:
@@ -79,5 +79,5 @@ def session(profile: str, length: float) -> tuple[Laboratory, int, int]:
 
 def _agree(lab: Laboratory) -> float:
     """How far the robot ever was from the virtual one's path [rad], at the same place of the plan."""
-    virtual = lab.operator.engine.timeline.sample(lab.play[:, 1])
+    virtual = lab.operator.robot.engine.timeline.sample(lab.play[:, 1])
     return float(np.abs(virtual - lab.reference.q).max())

@@ -121,7 +121,7 @@ class Bench:
         try:
             while True:
                 for client in list(self.server._clients.values()):
-                    here = client.session.waiting + client.socket.waiting()
+                    here = client.session.outbox.waiting + client.socket.waiting()
                     worst = max(worst, here + 2 * KERNEL_BUFFER)
                 await asyncio.sleep(0.1)
         except asyncio.CancelledError:

@@ -33,7 +33,7 @@ for i in range(COUNT):
 while (t := link.next_deadline()) is not None:
     link.forward.receive(t)
     link.backward.receive(t)
-totals = link.totals()
-for name, way in (("datagrams", totals.forward), ("in order", totals.backward)):
-    lost = sum(way.lost.values())
-    print(f"{name:9}: {way.arrived} arrived, {lost} lost, {way.resent} sent again, mean {way.delay_mean:.3f} s")
+for name, way in (("datagrams", link.forward), ("in order", link.backward)):
+    sums = way.log.totals()
+    lost = sum(sums.lost.values())
+    print(f"{name:9}: {sums.arrived} arrived, {lost} lost, {sums.resent} sent again, mean {sums.delay_mean:.3f} s")

@@ -13,10 +13,10 @@ from robots import puma560
 from vrs import Insertion, JointTarget, MotionCommand
 
 model = puma560.model()
-# The same as `vrs serve` in a shell; the exact body follows without physics, which starts quicker.
+# The same as `vrs serve` in a shell; the ideal body follows without physics, which starts quicker.
 command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--delay", "constant:0.05"]
 # On a busy machine messages may be late: the robot waits for them, instead of halting until it's told to go on.
-command += ["--body", "exact", "--link-loss", "hold"]
+command += ["--body", "ideal", "--link-loss", "hold"]
 server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 assert server.stdout is not None
 page = next(word for word in server.stdout.readline().split() if word.startswith("http"))

@@ -7,16 +7,17 @@ import math
 import numpy as np
 
 from interfaces.lab.localization.trial import Wanderer
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.floor_plan import plan_map
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import plan_map
+from robots.mobile.robot import BareBody
 from robots.onboard import LaserModel, Localizer, Status
 
 room = apartment(7, ApartmentConfig(rooms=3, people=2))
 worn = MobileReality(radius_error=(0.01, -0.01), slip_spread=0.01, dt=1 / 60)
 senses = Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02, sweep=0.03))
-body = BareBody("ipr", room=room, reality=worn, senses=senses, rng=1)
+body = BareBody(IPR, room=room, reality=worn, senses=senses, rng=1)
 # Nobody tells it where it begins: it has the plan, and turns on the spot until it knows.
 localizer = Localizer(plan_map(room))
 driver = Wanderer(room, np.random.default_rng(1))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.ipr.chassis import Senses
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import Senses
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import BareBody, place
 from robots.onboard import Goal, LaserModel
 from robots.onboard.driving import IPR_LIMITS, STAND, kept
 from robots.onboard.journey import GOING
@@ -21,7 +22,7 @@ doors = [
 home = replace(home, doors=tuple(doors), people=())
 sofa = home.place("sofa")
 start = sofa.x, sofa.y, -1.57
-body = BareBody("ipr", start, room=home, senses=Senses(camera=None, laser=LaserModel()), rng=1)
+body = BareBody(IPR, start, room=home, senses=Senses(camera=None, laser=LaserModel()), rng=1)
 position, on_board = LaserPosition(body), BodyNavigator(body, PERIOD)
 journey, b, before, routes = on_board.navigator.journey, home.place("B"), STAND, 0
 while body.time < 120.0:

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from robots import load
 from robots.bullet.rooms import read_room
-from robots.ipr.camera import NECK, PanTilt, Sight
+from robots.mobile.camera import PanTilt, Sight
+from robots.robot import HeadCamera
 
 room = read_room("""room 1
 name A hall
@@ -23,12 +25,14 @@ box 6.5 3  0.6 1.6 height=0.9
 person 0.25  0,3,0.5  6,3,5.5
 """)
 x, y, heading = room.start
-axes, sight = PanTilt(), Sight(room)
+camera = load("ipr").device(HeadCamera)
+assert camera is not None
+axes, sight = PanTilt(), Sight(room, camera)
 pictures, errors = [], []
 for k in range(60):
     t = 0.1 * k
     px, py = room.people[0].at(t)
-    wanted = math.atan2(py - y, px - x - NECK[0]) - heading
+    wanted = math.atan2(py - y, px - x - camera.neck[0]) - heading
     axes.aim(wanted, 0.0, now=t)
     errors.append(math.degrees(abs(wanted - axes.look(t).pan)))
     if k % 15 == 14:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from interfaces.stream.connection import Connection, MobileConnection
+    from interfaces.stream.connection import Connection
 
 
 def connect(
@@ -31,11 +32,13 @@ def connect(
         UnreachableError: If there's no answer, or the server refuses; it's a ConnectionError.
         ValueError: If role or encoding is none of those.
     """
-    from interfaces.messages.control import Role
+    from interfaces.messages.control import Role, Welcome
+    from interfaces.stream.client import ClientCore
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import Connection
 
-    return Connection(url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout)
+    client = partial(ClientCore, expects=Welcome, name=name, token=token, encoding=Encoding(encoding))
+    return Connection(url, client, role=Role(role), timeout=timeout)
 
 
 def connect_mobile(
@@ -46,12 +49,13 @@ def connect_mobile(
     name: str = "client",
     encoding: str = "vrs.1.msgpack",
     timeout: float = 5.0,
-) -> MobileConnection:
+) -> Connection:
     """Reach a mobile robot that `vrs serve --robot NAME` serves; see `connect`."""
     from interfaces.messages.control import Role
+    from interfaces.messages.mobile import MobileWelcome
+    from interfaces.stream.client import ClientCore
     from interfaces.stream.codec import Encoding
-    from interfaces.stream.connection import MobileConnection
+    from interfaces.stream.connection import Connection
 
-    return MobileConnection(
-        url, role=Role(role), token=token, name=name, encoding=Encoding(encoding), timeout=timeout
-    )
+    client = partial(ClientCore, expects=MobileWelcome, name=name, token=token, encoding=Encoding(encoding))
+    return Connection(url, client, role=Role(role), timeout=timeout)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from math import cos, hypot, sin
+from typing import Final
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, Wheels
 from vrs.model import Array
+
+PERIOD: Final = 0.1
+"""T: time between a mobile robot's commands unless said otherwise [s], an assumption: Han, Kim, Kim, Kim, 2001 has
+'every sampling time T' without a figure."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,8 +41,10 @@ BARE: Final = "bare"
 """Name of the usual mobile robot with its bare kinematic body."""
 USUAL_CLIENT: Final = "cubo"
 """The same of robots that are thin clients."""
-EXACT: Final = "exact"
+IDEAL: Final = "ideal"
 """Body of any arm: it's where its reference is."""
+EXACT: Final = "exact"
+"""The same by the name that it had before."""
 _FILES: Final = frozenset((".urdf", ".xacro", ".xml", ".mjcf"))
 
 
@@ -159,7 +161,14 @@ class Display:
 
 @dataclass(frozen=True, slots=True)
 class HeadCamera:
-    """A camera that pictures are made with."""
+    """A camera that pans and tilts, and that pictures are made with."""
+
+    neck: tuple[float, float, float]
+    """Where both axes cross, in the robot's frame [m]."""
+    reach: float
+    """How far the lens is before that [m]."""
+    body: Callable[[], LinkShape]
+    """What it may see of the robot, in the robot's frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +196,7 @@ class Robot:
     """None draws a base as a box, an arm as its frames and traces."""
     bodies: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     """What can be real of it, by name, the usual one first. Of an arm an `ArmMaker` each; of a base what makes a
-    `robots.ipr.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
+    `robots.mobile.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
     devices: tuple[object, ...] = ()
     """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
     found_by: str = ""
@@ -245,20 +254,31 @@ class Robot:
     @property
     def usual_body(self) -> str:
         """Name of the body that an arm has unless another is asked for."""
-        return next(iter(self.bodies), EXACT)
+        return next(iter(self.bodies), IDEAL)
+
+    def body_name(self, name: str = "") -> str:
+        """Name of a body that it has.
+
+        Args:
+            name: One of `bodies`, of an arm also `ideal`, or `exact` for that; the usual one unless given.
+
+        Raises:
+            InvalidValueError: If it has no such body.
+        """
+        asked = IDEAL if name == EXACT else name or self.usual_body
+        ideal = () if self.is_base else (IDEAL,)
+        return one_of(f"body of {self.name}", asked, dict.fromkeys((*self.bodies, *ideal)))
 
     def body(self, name: str = "") -> Callable[..., Any]:
         """What makes a body: of an arm an `ArmMaker`.
 
         Args:
-            name: One of `bodies`, of an arm also `exact`; the usual one unless given.
+            name: See `body_name`.
 
         Raises:
             InvalidValueError: If it has no such body.
         """
-        exact: dict[str, Callable[..., Any]] = {} if self.is_base else {EXACT: exact_arm}
-        bodies = {**self.bodies, **exact}
-        return bodies[one_of(f"body of {self.name}", name or self.usual_body, bodies)]
+        return {**self.bodies, IDEAL: exact_arm}[self.body_name(name)]
 
 
 def names() -> tuple[str, ...]:

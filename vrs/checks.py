@@ -153,12 +153,32 @@ def within(low: float, high: float, unit: str = "") -> msgspec.Meta:
     return msgspec.Meta(ge=low, le=high, extra={"unit": unit} if unit else None)
 
 
+def positive(said: str = "a positive number") -> msgspec.Meta:
+    """Return what stands in the annotation of a field for any finite number above 0.
+
+    Args:
+        said: What is allowed, in messages.
+    """
+    return msgspec.Meta(gt=0, extra={"said": said})
+
+
+def at_least(low: float, said: str) -> msgspec.Meta:
+    """Return what stands in the annotation of a field for any finite number from `low` on.
+
+    Args:
+        low: Smallest allowed.
+        said: What is allowed, in messages.
+    """
+    return msgspec.Meta(ge=low, extra={"said": said})
+
+
 def validated(cls: _ClassT) -> _ClassT:
     """Check the fields of a dataclass by their annotations when one is made; stands below `@dataclass`.
 
-    A field with a range (`within`) is a number in it, kept as a float, or an integer where the annotation says so;
-    a `bool` is True or False; None passes where the annotation admits it. The class's own `__post_init__` follows.
-    What is not allowed raises InvalidValueError.
+    A field with a range (`within`, `positive`, `at_least`) is a number in it, kept as a float, or an integer where
+    the annotation says so; one with a least and a most length has as many elements; a `bool` is True or False; None
+    passes where the annotation admits it. The class's own `__post_init__` follows. What is not allowed raises
+    InvalidValueError.
 
     Args:
         cls: The class, its fields annotated.
@@ -226,13 +246,28 @@ def _boolean(name: str, value: object) -> object:
 def _in_range(name: str, kind: type, note: msgspec.Meta, optional: bool, value: object) -> object:
     if optional and value is None:
         return None
+    if note.max_length is not None:
+        return _counted(name, note, value)
     low, high = note.ge, note.le
+    said = (note.extra or {}).get("said")
+    if said is not None:
+        number = finite(name, value, said)
+        if number <= note.gt if note.gt is not None else low is not None and number < low:
+            raise InvalidValueError(name, value, said)
+        return number
     assert low is not None, name
     assert high is not None, name
     if kind is int:
         return integer_in(name, value, int(low), int(high))
     unit = (note.extra or {}).get("unit", "")
     return number_in(name, value, low, high, unit=unit and f" {unit}")
+
+
+def _counted(name: str, note: msgspec.Meta, value: Any) -> object:
+    least, most = note.min_length or 0, note.max_length or 0
+    if not least <= len(value) <= most:
+        raise InvalidValueError(name, len(value), f"{least} to {most}")
+    return value
 
 
 def bounded_text(path: Path, most: int, encoding: str = "utf-8") -> str:

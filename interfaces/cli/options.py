@@ -11,12 +11,12 @@ import socket
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
 
 import typer
 
-from robots.robot import FOUND, load
-from vrs.errors import InvalidValueError
+from robots.robot import FOUND, HeadCamera, load
+from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
     import asyncio
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
+    from robots.bullet.rooms import Room
     from robots.onboard import LossPolicy
     from robots.robot import Robot
 
@@ -68,7 +69,34 @@ RecordedRobot: TypeAlias = Annotated[
     ),
 ]
 BodyName: TypeAlias = Annotated[
-    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, exact or another of its own.")
+    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, ideal or another of its own.")
+]
+ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
+"""Unless others are asked for."""
+Architecture: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--architecture",
+        metavar="NAME",
+        help="Of a mobile robot, what it does with the operator's path: I, II, III, III-capped, extended, "
+        "timeline, or MODULE:NAME of your own.",
+    ),
+]
+RoomName: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--room",
+        metavar="NAME|FILE",
+        help="Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file.",
+    ),
+]
+OperatorLossName: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--operator-loss",
+        metavar="POLICY",
+        help="Of a mobile robot, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
+    ),
 ]
 Host: TypeAlias = Annotated[
     str,
@@ -119,6 +147,80 @@ def val_robot(name: str) -> Robot:
     if not speaks_val(robot):
         raise InvalidValueError("robot", name, f"an arm of {VAL_JOINTS} joints that turn, as VAL-II has places for")
     return robot
+
+
+OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose")
+"""Options that arms alone have, by their names without dashes."""
+OF_VAL: Final = ("val-port", "val-files")
+"""The same of robots that VAL-II has places for."""
+OF_BASES: Final = ("architecture", "room", "jobs", "operator-loss")
+"""The same of mobile robots."""
+OF_CAMERAS: Final = ("camera",)
+"""The same of robots that pictures are made of."""
+OF_SITES: Final = (
+    "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead", "body",
+    "friction", "pose", "reports", "reached-as",
+)  # fmt: skip
+"""The same of robots that have a site, as thin clients haven't."""
+
+
+def check_taken(robot: Robot, ctx: typer.Context) -> None:
+    """Check that no option was given that a robot has nothing of.
+
+    Args:
+        robot: The robot.
+        ctx: Of the command.
+
+    Raises:
+        InvalidValueError: If one was.
+    """
+    others = OF_ARMS if robot.is_base else OF_BASES
+    val = () if speaks_val(robot) else OF_VAL
+    cameras = () if robot.device(HeadCamera) else OF_CAMERAS
+    left_out(ctx, f"{robot.name} has nothing of the kind", (*others, *val, *cameras))
+
+
+def left_out(ctx: typer.Context, why: str, options: Iterable[str]) -> None:
+    """Check that no option was given that would do nothing; what is the usual value counts as not given.
+
+    Args:
+        ctx: Of the command.
+        why: They would do nothing.
+        options: Their names, without dashes; the command needn't have them all.
+
+    Raises:
+        InvalidValueError: If one was.
+    """
+    known = {option.opts[0]: option for option in ctx.command.params}
+    for name in options:
+        option = known.get(f"--{name}")
+        if option is None:
+            continue
+        value = ctx.params[str(option.name)]
+        # One that may be repeated is () unless it's given.
+        if value not in (option.get_default(ctx), ()):
+            raise InvalidValueError(name, str(value), f"left out: {why}")
+
+
+def room_of(text: str) -> Room:
+    """A room by its name, or of a file.
+
+    Raises:
+        InvalidValueError: If there's neither a room of that name nor such a file.
+        FormatError: If the file can't be read.
+    """
+    from robots.bullet.rooms import load_room
+    from robots.mobile.robot import PLACES, place
+
+    if text in PLACES:
+        return place(text)
+    path = Path(text)
+    if not path.is_file():
+        raise InvalidValueError("room", text, f"one of {', '.join(PLACES)}, or a file that's there")
+    try:
+        return load_room(path)
+    except OSError as error:
+        raise FormatError(path.name, error.strerror or str(error)) from None
 
 
 def is_loopback(host: str) -> bool:

@@ -10,29 +10,28 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.mobile import (
+from interfaces.cli.options import (
     ARCHITECTURE,
+    OF_SITES,
     OPERATOR_LOSS,
     ROOM,
     Architecture,
-    OperatorLossName,
-    RoomName,
-    left_out,
-    room_of,
-    without,
-)
-from interfaces.cli.options import (
     BodyName,
     Hosts,
+    OperatorLossName,
     ReachedAs,
     RobotName,
+    RoomName,
     TokenFile,
     access_for,
     asked_for,
+    check_taken,
     end_on_signal,
     end_with_input,
     is_loopback,
     keep_quiet,
+    left_out,
+    room_of,
     saying_policy,
 )
 from interfaces.system import software
@@ -144,11 +143,10 @@ async def _serve_rsp(
 
 POSE = "nominal"
 """Pose to begin in, unless told otherwise; see `vrs.model.home`."""
-LISTEN = "127.0.0.1:8601"
-"""Where an operator's site connects, unless told otherwise."""
 
 
 def robot(
+    ctx: typer.Context,
     rsp: Annotated[
         str | None,
         typer.Option(
@@ -164,7 +162,7 @@ def robot(
     listen: Annotated[
         str,
         typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
-    ] = LISTEN,
+    ] = "127.0.0.1:8601",
     name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
@@ -215,13 +213,7 @@ def robot(
 ) -> None:
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
     if rsp is not None:
-        left_out("a thin client has nothing of the kind", {
-            "listen": (listen, LISTEN), "architecture": (architecture, ARCHITECTURE),
-            "offset": (offset, "adaptive"), "link-loss": (link_loss, "halt"), "timeout": (timeout, 0.5),
-            "operator-loss": (operator_loss, OPERATOR_LOSS), "max-age": (max_age, 0.5), "lead": (lead, 0.05),
-            "body": (body, ""), "friction": (friction, True), "pose": (pose, POSE),
-            "reports": (reports, 30.0), "reached-as": (reached_as, None),
-        })  # fmt: skip
+        left_out(ctx, "a thin client has nothing of the kind", OF_SITES)
         thin_client(
             USUAL_CLIENT if name == USUAL else name, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof
         )
@@ -238,15 +230,7 @@ def robot(
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
     chosen = load(name)
-    arms = {
-        "offset": (offset, "adaptive"), "lead": (lead, 0.05), "body": (body, ""),
-        "friction": (friction, True), "pose": (pose, POSE),
-    }  # fmt: skip
-    bases = {
-        "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM),
-        "operator-loss": (operator_loss, OPERATOR_LOSS),
-    }  # fmt: skip
-    without(name, arms if chosen.is_base else bases)
+    check_taken(chosen, ctx)
     address = parse_address("--listen", listen)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")
@@ -261,7 +245,8 @@ def robot(
         from interfaces.messages.jobs import POLICY_SAYS, OperatorLoss
         from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
         from interfaces.teleop.architectures.compositions import CONTROL
-        from interfaces.teleop.driving import DrivenConfig, Hands
+        from interfaces.teleop.autonomy import Hands
+        from interfaces.teleop.following_base import DrivenConfig
         from interfaces.val2.val_arm import ValArm, in_a_thread
 
         driven = DrivenConfig(period=CONTROL, beat=beat, watchdog=watchdog)

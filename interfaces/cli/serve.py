@@ -10,38 +10,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.mobile import (
+from interfaces.cli.options import (
     ARCHITECTURE,
-    CAMERA,
-    JOBS,
     OPERATOR_LOSS,
+    PROFILES,
     ROOM,
     Architecture,
-    CameraRate,
-    MobileServing,
-    OperatorLossName,
-    RoomName,
-    left_out,
-    room_of,
-    serve_mobile,
-    without,
-)
-from interfaces.cli.options import (
-    PROFILES,
     BodyName,
     Host,
     Hosts,
+    OperatorLossName,
     Port,
     ReachedAs,
     RobotName,
+    RoomName,
     TokenFile,
     abandon,
     access_for,
     asked_for,
+    check_taken,
     collect_at_leisure,
     end_on_signal,
     end_with_input,
     keep_quiet,
+    left_out,
+    room_of,
     say_lost,
     say_robot,
     speaks_val,
@@ -51,28 +44,33 @@ from interfaces.system import software
 from robots.robot import USUAL, HeadCamera, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
-from vrs.model import home
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from contextlib import AbstractAsyncContextManager
 
     from interfaces.link import LinkConditions
     from interfaces.recording.live import LiveRecording
+    from interfaces.runtime.live.operator import LiveOperator
+    from interfaces.station.page import Station
     from interfaces.stream.access import Access
+    from robots.bullet.rooms import Room
     from robots.onboard import LossPolicy
     from robots.robot import Robot
 
-RECORDINGS = Path("recordings")
-"""Where the station records to, unless told otherwise."""
-
 
 def serve(
+    ctx: typer.Context,
     host: Host = "127.0.0.1",
     port: Port = 8600,
     name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
-    camera: CameraRate = CAMERA,
+    camera: Annotated[
+        float,
+        typer.Option(
+            "--camera", metavar="RATE", help="Pictures a second of a robot's camera, 1 to 30; 0 for no camera."
+        ),
+    ] = 6.0,
     delay: Annotated[
         str,
         typer.Option(
@@ -109,7 +107,7 @@ def serve(
     operator_loss: OperatorLossName = OPERATOR_LOSS,
     jobs: Annotated[
         Path, typer.Option("--jobs", metavar="FILE.json", help="Of a mobile robot, where the list of jobs is kept.")
-    ] = JOBS,
+    ] = Path("jobs.json"),
     max_age: Annotated[
         float,
         typer.Option(
@@ -148,7 +146,7 @@ def serve(
     recordings: Annotated[
         Path,
         typer.Option("--recordings", metavar="DIR", help="Where the station records to; made when it's needed."),
-    ] = RECORDINGS,
+    ] = Path("recordings"),
     until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
@@ -158,8 +156,7 @@ def serve(
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.messages.jobs import OperatorLoss
-    from interfaces.messages.recording import OWN
-    from interfaces.recording.live import RATE, LiveRecording
+    from interfaces.recording.live import RATE
     from interfaces.recording.mcap_file import Sink
     from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.live.emulation import late_often, too_slow
@@ -172,11 +169,8 @@ def serve(
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
     robot.body(body)
     if robot_at is not None:
-        left_out("the robot at --robot-at has its own", {
-            "offset": (offset, "adaptive"), "max-age": (max_age, 0.5),
-            "body": (body, ""), "operator-loss": (operator_loss, OPERATOR_LOSS),
-            "architecture": (architecture, ARCHITECTURE),
-        })  # fmt: skip
+        its_own = "offset", "max-age", "body", "operator-loss", "architecture"
+        left_out(ctx, "the robot at --robot-at has its own", its_own)
     elif robot_token_file is not None:
         raise InvalidValueError("robot-token-file", str(robot_token_file), "left out without --robot-at")
     profile = delay_profile(delay)
@@ -191,117 +185,106 @@ def serve(
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
     allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    check_taken(robot, ctx)
+    place = room_of(room)
     if robot.is_base:
-        without(robot.name, {
-            "offset": (offset, "adaptive"), "body": (body, ""), "val-port": (val_port, None),
-            "val-files": (val_files, Path()), "record": (record, None), "recordings": (recordings, RECORDINGS),
-        })  # fmt: skip
-        room_of(room)
         if jobs.exists() and not jobs.is_file():
             raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
         makes(architecture)
-        if robot.device(HeadCamera) is None:
-            without(robot.name, {"camera": (camera, CAMERA)})
-        if camera:
-            number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
-        serving = MobileServing(
-            robot, host, port, allowed, room, architecture, link, policy, max_age, seed, at, token, until_eof,
-            one_of("operator-loss", operator_loss, OperatorLoss), jobs, camera,
-        )  # fmt: skip
-        _advise(advice)
-        uvloop.run(serve_mobile(serving, access_for(host, token_file, free=OPEN)))
-        return
-    without(robot.name, {
-        "architecture": (architecture, ARCHITECTURE), "room": (room, ROOM), "jobs": (jobs, JOBS),
-        "operator-loss": (operator_loss, OPERATOR_LOSS), "camera": (camera, CAMERA),
-    })  # fmt: skip
-    if not speaks_val(robot):
-        without(robot.name, {"val-port": (val_port, None), "val-files": (val_files, Path())})
+    if camera:
+        number_in("camera", camera, 1.0, 30.0, unit=" pictures a second, or 0 for no camera")
+    one_of("operator-loss", operator_loss, OperatorLoss)
     behind = spelled(fixed_offset(offset, profile))
-    options = ["--robot", name, "--offset", behind, "--max-age", f"{max_age:g}"]
-    options += ["--body", body] if body else []
-    recording = None
-    told = behind if robot_at is None else OWN, OWN if policy is None else policy.value
     if recordings.exists() and not recordings.is_dir():
         raise InvalidValueError("recordings", str(recordings), "a directory, or one that can be made")
-    if record is not None:
-        if record.is_file():
-            raise InvalidValueError("record", str(record), "a file that isn't there yet: none is written over")
-        # Before a robot is started.
-        Sink.create(record).close()
-        options += ["--reports", f"{RATE:g}"]
-        recording = LiveRecording(record, *told, _recording_failed)
-    _advise(advice)
+    if record is not None and record.is_file():
+        raise InvalidValueError("record", str(record), "a file that isn't there yet: none is written over")
     if not val_files.is_dir():
         raise InvalidValueError("val-files", str(val_files), "a directory")
-    access = access_for(host, token_file, free=OPEN)
-    own = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    doors = _Doors(host, port, allowed, val_port, val_files, own, until_eof)
-    uvloop.run(
-        _serve(
-            robot,
-            access,
-            doors,
-            link,
-            seed,
-            at,
-            token,
-            policy,
-            options,
-            recording,
-            _Shelved(recordings, *told),
-        )
-    )
-
-
-def _advise(advice: str) -> None:
-    """Say what is likely to go wrong, if anything is."""
+    if record is not None:
+        # Before a robot is started.
+        Sink.create(record).close()
     if advice:
         typer.echo(f"vrs: {advice}", err=True)
-
-
-def _recording_failed(problem: str) -> None:
-    typer.echo(f"vrs: {problem}", err=True)
+    options = [
+        "--robot", name, "--offset", behind, "--max-age", f"{max_age:g}", "--body", body, "--room", room,
+        "--architecture", architecture, "--operator-loss", operator_loss,
+    ]  # fmt: skip
+    if record is not None and not robot.is_base:
+        options += ["--reports", f"{RATE:g}"]
+    access = access_for(host, token_file, free=OPEN)
+    val = _Val(val_port, val_files) if speaks_val(robot) else None
+    eye = camera if robot.device(HeadCamera) else 0.0
+    serving = _Serving(
+        robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye, val,
+        record, recordings, behind, architecture,
+    )  # fmt: skip
+    uvloop.run(_serve(serving, access))
 
 
 @dataclass(frozen=True, slots=True)
-class _Doors:
-    """Where it listens."""
+class _Val:
+    """VAL-II's terminals."""
 
+    port: int | None
+    """Of those over TCP; None for none."""
+    files: Path
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Serving:
+    """What is served, where, and how the robot is reached."""
+
+    robot: Robot
     host: str
     port: int
     allowed: Hosts
     """What requests may ask for."""
-    val_port: int | None
-    """Of the monitor; None for none."""
-    val_files: Path
-    own_token: str | None = field(repr=False)
-    """By which the monitor is an operator."""
+    conditions: LinkConditions
+    seed: int
+    link_loss: LossPolicy | None
+    """None leaves it to the robot."""
+    robot_at: str | None
+    """`ws://HOST:PORT/site`; None: one is started."""
+    robot_token: str | None = field(repr=False)
+    options: tuple[str, ...]
+    """Of the robot that is started."""
     until_eof: bool
-
-
-@dataclass(frozen=True, slots=True)
-class _Shelved:
-    """Where the station records to, and what a recording says of the robot."""
-
-    directory: Path
+    room: Room
+    """Where a mobile robot drives."""
+    jobs: Path
+    """Where its list of jobs is kept."""
+    camera: float
+    """Pictures a second; 0 for none, nor voice and screen."""
+    val: _Val | None
+    """None where VAL-II has no places for the robot."""
+    record: Path | None
+    """Where everything is recorded to; None for nowhere."""
+    recordings: Path
+    """Where the station records to."""
     offset: str
-    link_loss: str
+    """Of the robot that is started: how far it plays behind."""
+    architecture: str
+    """Of a mobile robot that is started: what it does with the operator's path."""
+
+    def recording(self, path: Path, *, over: bool = True) -> LiveRecording:
+        """What is recorded into a file, which may be written over."""
+        from interfaces.messages.recording import OWN
+        from interfaces.recording.live import LiveRecording
+
+        return LiveRecording(
+            path,
+            offset=self.offset if self.robot_at is None else OWN,
+            link_loss=OWN if self.link_loss is None else self.link_loss.value,
+            failed=lambda problem: typer.echo(f"vrs: {problem}", err=True),
+            over=over,
+            robot=self.robot.name,
+            room=self.room,
+            architecture=self.architecture if self.robot_at is None else OWN,
+        )
 
 
-async def _serve(
-    arm: Robot,
-    access: Access,
-    doors: _Doors,
-    conditions: LinkConditions,
-    seed: int,
-    robot_at: str | None,
-    robot_token: str | None,
-    link_loss: LossPolicy | None,
-    options: Sequence[str],
-    recording: LiveRecording | None,
-    shelved: _Shelved,
-) -> None:
+async def _serve(serving: _Serving, access: Access) -> None:
     """Run until a signal comes. The page is there before the robot is."""
     import asyncio
     import contextlib
@@ -311,78 +294,99 @@ async def _serve(
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    host = doors.host
+    served, host, val = serving.robot, serving.host, serving.val
     async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
-        listening = stack.enter_context(contextlib.closing(sockets.bind(host, doors.port)))
+        listening = stack.enter_context(contextlib.closing(sockets.bind(host, serving.port)))
         port = listening.getsockname()[1]
+        shown = Address(host, port)
         val_listening = None
-        if doors.val_port is not None:
-            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", doors.val_port)))
+        if val is not None and val.port is not None:
+            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", val.port)))
         lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        robot = asyncio.create_task(start_robot(robots, robot_at, options, lost.set_result))
+        robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options, lost.set_result))
         stack.push_async_callback(abandon, robot)
         await asyncio.to_thread(_load)
 
         from interfaces.messages.control import Role
-        from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
-        from interfaces.station.chain import described
-        from interfaces.station.page import Station
-        from interfaces.station.panels import PANELS
+        from interfaces.runtime.live.twins import ArmTwins
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
+        from interfaces.stream.local import LocalClient
         from interfaces.stream.server import application
         from interfaces.val2.pages import PageTerminalServer
-        from interfaces.val2.rooms import HOST, ServedVal
+        from interfaces.val2.rooms import HOST, served_room
         from interfaces.val2.tcp import TcpTerminalServer
         from robots.onboard.lease import LeaseState
 
-        model = arm.arm
-        config = LiveOperatorConfig(
-            arm, home(model), "", conditions, robot_token, seed,
-            server=software(), recording=recording, link_loss=link_loss,
-        )  # fmt: skip
-        operator = LiveOperator(config, access)
+        operator = _operator(serving, access)
         lost.add_done_callback(partial(say_lost, operator.lose))
-        panels = tuple(panel for panel in PANELS if speaks_val(arm) or panel.name != "terminal")
-        station = Station(described(model, operator.scene.tool), panels=panels)
-        shown = Address(host, port)
-        near = Address("127.0.0.1", port) if host in {"0.0.0.0", "::"} else shown  # noqa: S104 - compared
-        val = ServedVal(f"ws://{near}/ws", doors.own_token, doors.val_files, software())
-        terminals = PageTerminalServer(val.enter, access).route
-        recordings = Recordings(
-            operator, Shelf(shelved.directory, arm), access,
-            offset=shelved.offset, link_loss=shelved.link_loss, failed=_recording_failed,
-        )  # fmt: skip
-        routes = [*operator.routes, terminals, *recordings.routes, *station.routes]
-        app = application(routes, doors.allowed(port))
-        await stack.enter_async_context(station.running())
-        await stack.enter_async_context(sockets.serve(app, listening))
-        await stack.enter_async_context(operator.running())
-        await stack.enter_async_context(recordings.running())
-        await stack.enter_async_context(val.running())
+        station = _station(serving)
+        shelf, what = Shelf(serving.recordings, served), partial(serving.recording, over=False)
+        recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
+        routes = [*operator.routes, *recordings.routes]
+        parts: list[AbstractAsyncContextManager[object]] = [operator.running(), recordings.running()]
+        if val is not None:
+            assert isinstance(operator.twins, ArmTwins)
+            client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
+            room = served_room(client, operator.twins.operator, val.files, software())
+            routes.append(PageTerminalServer(room, access).route)
+        app = application([*routes, *station.routes], serving.allowed(port))
+        for part in (station.running(), sockets.serve(app, listening), *parts):
+            await stack.enter_async_context(part)
         keep_quiet()
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
         stack.callback(tidying.cancel)
-        typer.echo(f"vrs: serving {arm.name} on http://{shown}/view (programs: ws://{shown}/ws)")
+        typer.echo(f"vrs: serving {served.name} on http://{shown}/view (programs: ws://{shown}/ws)")
         typer.echo(f"vrs: operator station on http://{shown}/")
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
-            val_door = TcpTerminalServer(await val.enter(), val_access)
+            await room.ready()
+            val_door = TcpTerminalServer(room, val_access)
             await stack.enter_async_context(val_door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:
                 typer.echo(f"vrs: VAL-II asks each terminal for a token, the first line to send: {val_token}")
         sys.stdout.flush()
-        if doors.until_eof:
+        if serving.until_eof:
             end_with_input(ended)
         ending = asyncio.create_task(ended.wait())
         await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
         if robot.done():
             operator.robot.url = robot.result()
-            say_robot(robot.result(), conditions, link_loss)
+            say_robot(robot.result(), serving.conditions, serving.link_loss)
         await ending
+
+
+def _operator(serving: _Serving, access: Access) -> LiveOperator:
+    """Make the operator's site."""
+    from interfaces.jobs import JobFile
+    from interfaces.media import CameraConfig
+    from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
+    from interfaces.val2.val_arm import lasts
+
+    record = serving.record
+    config = LiveOperatorConfig(
+        serving.robot, "", serving.conditions, serving.robot_token, serving.seed, software(), serving.link_loss,
+        recording=None if record is None else serving.recording(record),
+        room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
+        camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
+    )  # fmt: skip
+    return LiveOperator(config, access)
+
+
+def _station(serving: _Serving) -> Station:
+    """Make the page."""
+    from interfaces.station.chain import described
+    from interfaces.station.page import Station
+    from interfaces.station.panels import Offer, panels_of
+
+    robot = serving.robot
+    offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
+    offers |= {Offer.CAMERA} if serving.camera else set()
+    offers |= {Offer.TERMINALS} if serving.val is not None else set()
+    return Station(described(robot), panels_of(offers))
 
 
 def _load() -> None:

@@ -5,22 +5,18 @@ Source: Doulgeri, Zikos, Delopoulos, section III.
 
 from __future__ import annotations
 
-import math
-from collections import OrderedDict
 from dataclasses import dataclass, replace
 
+from typing_extensions import override
+
 from interfaces.clients.observer import Observation, Observer
-from interfaces.clients.ports import RemotePort, port_to
+from interfaces.clients.ports import Asking, RemotePort, port_to
 from interfaces.engine_server.site import earliest
-from interfaces.link.delivery import Resending
 from interfaces.messages import Order, Outcome, RefusalCode, Reply
 from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
-from vrs.ledger import Receipt
-
-REMEMBERED = 4096
-"""Commands whose fate is kept; the oldest is forgotten first."""
+from vrs.ledger import Receipt, Status
 
 PENDING = 200
 """Commands that may be without an answer; a stop may be beyond them."""
@@ -53,6 +49,13 @@ class Issued:
         return self.answered_at is None
 
     @property
+    def reason(self) -> str:
+        """Why nothing came of it; empty where something did, or may yet."""
+        if self.receipt is not None and self.receipt.status is Status.REJECTED:
+            return self.receipt.reason
+        return self.refusal
+
+    @property
     def late(self) -> float:
         """How much later than asked it is carried out [s]; 0 where it's in time, or not carried out."""
         receipt = self.receipt
@@ -61,7 +64,7 @@ class Issued:
         return max(receipt.execute_at - receipt.asked_at, 0.0)
 
 
-class Designer:
+class Designer(Asking[Order, Issued]):
     """Issues motion commands, steering inputs and edits of the plan.
 
     Over a link, a command is sent again until it's answered; the servlet carries it out once.
@@ -79,11 +82,7 @@ class Designer:
         self._repeat = int(finite("repeat", repeat, "0 to 10"))
         if not 0 <= self._repeat <= 10:
             raise InvalidValueError("repeat", repeat, "0 to 10")
-        self._port, self._own = port_to(engine)
-        self._port.join(self)
-        self._issued: OrderedDict[int, Issued] = OrderedDict()
-        self._pending: Resending[Order] = Resending(resend)
-        self._news: OrderedDict[int, None] = OrderedDict()
+        super().__init__(engine, resend)
         self._number = 0
 
     def issue(self, command: Command, *, now: float, execute_in: float | None = None) -> Issued:
@@ -103,7 +102,7 @@ class Designer:
         """
         if isinstance(command, PositionQuery):
             raise InvalidValueError("command", command, "one that changes something; an Observer asks")
-        if len(self._pending) >= PENDING and not isinstance(command, Stop):
+        if len(self._open) >= PENDING and not isinstance(command, Stop):
             raise InvalidValueError("command", command, f"issued when fewer than {PENDING} have no answer")
         now = finite("now", now, "finite seconds")
         if isinstance(command, (MotionCommand, SteerCommand, DriveCommand, PlanEdit)):
@@ -123,25 +122,24 @@ class Designer:
 
     def _send(self, command: Command | None, now: float) -> Issued:
         number = self._number = self._port.order_number()
-        self._issued[number] = Issued(number, command, now)
-        if len(self._issued) > REMEMBERED:
-            self._issued.popitem(last=False)
+        self._keep(number, Issued(number, command, now), news=False)
         order = Order(number, command)
-        again = self._pending.newest(self._repeat)
-        self._pending.add(number, order, now)
+        again = self._open.newest(self._repeat)
+        self._open.add(number, order, now)
         for message in (*again, order):
             self._port.send(message, now=now)
-        return self._issued[number]
+        return self._kept[number]
 
+    @override
     def receive(self, message: Reply, *, now: float) -> None:
         """Take an answer; an old one that comes after a newer is passed over."""
-        if not isinstance(message, Outcome) or message.number not in self._issued:
+        if not isinstance(message, Outcome) or message.number not in self._kept:
             return
-        self._pending.drop(message.number)
-        known = self._issued[message.number]
+        self._open.drop(message.number)
+        known = self._kept[message.number]
         if message.revision <= known.revision:
             return
-        self._issued[message.number] = replace(
+        known = replace(
             known,
             answered_at=now if known.answered_at is None else known.answered_at,
             receipt=message.receipt,
@@ -149,25 +147,7 @@ class Designer:
             revision=message.revision,
             code=message.code,
         )
-        self._news[message.number] = None
-        if len(self._news) > REMEMBERED:
-            self._news.popitem(last=False)
-
-    def advance(self, *, now: float) -> tuple[Issued, ...]:
-        """Send again what has no answer; the commands of which something was heard since the last call."""
-        if self._own is not None:
-            self._own.advance(now=now)
-        for order in self._pending.due(now):
-            self._port.send(order, now=now)
-        news = tuple(self._issued[number] for number in self._news if number in self._issued)
-        self._news.clear()
-        return news
-
-    def next_deadline(self) -> float | None:
-        """When something is sent again [s]; −∞ where something was heard, None for nothing to do."""
-        if self._news:
-            return -math.inf
-        return earliest(self._pending.next_deadline(), None if self._own is None else self._own.next_deadline())
+        self._keep(message.number, known)
 
     def issued(self, number: int) -> Issued:
         """What is known of a command.
@@ -176,19 +156,19 @@ class Designer:
             UnknownCommandError: If no command of that number is kept.
         """
         try:
-            return self._issued[number]
+            return self._kept[number]
         except KeyError:
             raise UnknownCommandError(number, self._number) from None
 
     @property
     def history(self) -> tuple[Issued, ...]:
         """The newest 4096 commands, oldest first."""
-        return tuple(self._issued.values())
+        return tuple(self._kept.values())
 
     @property
     def pending(self) -> tuple[Issued, ...]:
         """The commands without an answer, oldest first."""
-        return tuple(self._issued[number] for number in self._pending.numbers() if number in self._issued)
+        return tuple(self._kept[number] for number in self._open.numbers() if number in self._kept)
 
 
 class Supervisor:
@@ -215,11 +195,6 @@ class Supervisor:
     def observation(self, number: int) -> Observation | None:
         """The answer to a question; see `Observer.observation`."""
         return self.observer.observation(number)
-
-    def receive(self, message: Reply, *, now: float) -> None:
-        """Take a reply; those that come by the port have been taken already, and count once."""
-        self.designer.receive(message, now=now)
-        self.observer.receive(message, now=now)
 
     def advance(self, *, now: float) -> tuple[Issued | Observation, ...]:
         """Do what is due; what was heard of commands, then the answers."""

@@ -9,16 +9,13 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
 
-from interfaces.clients.ports import RemotePort, port_to
-from interfaces.engine_server.site import earliest
-from interfaces.link.delivery import Resending
+from typing_extensions import override
+
+from interfaces.clients.ports import Asking, RemotePort
 from interfaces.messages import Answer, Ask, Frame, FrameStatus, Reply
 from vrs.commands import finite
 from vrs.engine import Engine
 from vrs.errors import NonFiniteTimeError
-
-REMEMBERED = 4096
-"""Answers that are kept; the oldest is forgotten first."""
 
 PENDING = 1024
 """Questions that wait, for an answer or for the fate of a predicted one; the oldest is given up first."""
@@ -56,7 +53,7 @@ class Observation:
         return self.received_at - self.asked_at
 
 
-class Observer:
+class Observer(Asking[Ask, Observation]):
     """Asks for g(t) at any time.
 
     What's predicted is asked for again when its time has passed, until its fate is known.
@@ -69,13 +66,10 @@ class Observer:
             engine: A port, or an engine in this process.
             resend: After how long without an answer a question is sent again [s], at first; longer and longer then.
         """
-        self._port, self._own = port_to(engine)
-        self._port.join(self)
-        self._asked: OrderedDict[int, tuple[Ask, float]] = OrderedDict()
-        self._open: Resending[Ask] = Resending(resend)
-        self.answers: OrderedDict[int, Observation] = OrderedDict()
+        super().__init__(engine, resend)
+        self.answers = self._kept
         """What was answered lately, by number."""
-        self._news: OrderedDict[int, None] = OrderedDict()
+        self._asked: OrderedDict[int, tuple[Ask, float]] = OrderedDict()
         self.confirmed = 0
         """Predicted answers that came true."""
         self.falsified = 0
@@ -107,6 +101,7 @@ class Observer:
         self._port.send(ask, now=now)
         return ask.number
 
+    @override
     def receive(self, message: Reply, *, now: float) -> None:
         """Take an answer, or news of an earlier one."""
         if not isinstance(message, Answer) or message.frame.number not in self._asked:
@@ -116,12 +111,12 @@ class Observer:
         known = self.answers.get(frame.number)
         if known is None:
             known = Observation(frame, asked_at, now)
-            self._keep(known)
+            self._keep(frame.number, known)
         elif known.frame.status is not FrameStatus.PREDICTED or not _same(known.frame, frame):
             return
         elif frame.status is not FrameStatus.PREDICTED:
             self._count(frame.status)
-            self._keep(replace(known, frame=frame))
+            self._keep(frame.number, replace(known, frame=frame))
         if frame.status is FrameStatus.PREDICTED:
             first = now + max(frame.t - message.now, 0.0)
             if known.frame is frame:
@@ -134,37 +129,9 @@ class Observer:
         self.confirmed += status is FrameStatus.CONFIRMED
         self.falsified += status is FrameStatus.FALSIFIED
 
-    def _keep(self, observation: Observation) -> None:
-        number = observation.number
-        self.answers[number] = observation
-        self._news[number] = None
-        for kept in (self.answers, self._news):
-            if len(kept) > REMEMBERED:
-                kept.popitem(last=False)
-
-    def advance(self, *, now: float) -> tuple[Observation, ...]:
-        """Send again what is open; the answers that came or changed since the last call."""
-        if self._own is not None:
-            self._own.advance(now=now)
-        for ask in self._open.due(now):
-            self._port.send(ask, now=now)
-        news = tuple(self.answers[number] for number in self._news if number in self.answers)
-        self._news.clear()
-        return news
-
-    def next_deadline(self) -> float | None:
-        """When something is sent again [s]; −∞ where something came, None for nothing to do."""
-        if self._news:
-            return -math.inf
-        return earliest(self._open.next_deadline(), None if self._own is None else self._own.next_deadline())
-
     def observation(self, number: int) -> Observation | None:
         """The answer to a question; None while there's none, or where it's forgotten."""
         return self.answers.get(number)
-
-    def close(self) -> None:
-        """Listen no more."""
-        self._port.leave(self)
 
     @property
     def share_falsified(self) -> float | None:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
-from typing import Any, Protocol
+import math
+from abc import ABC, abstractmethod
+from collections import OrderedDict, deque
+from typing import Any, Generic, Protocol, TypeVar
 
 from interfaces.engine_server.site import Site, earliest
+from interfaces.link.delivery import Resending
 from interfaces.link.link import Direction
 from interfaces.messages import Reply, Request
 from vrs.engine import Engine
+
+REMEMBERED = 4096
+"""Answers that a client keeps; the oldest is forgotten first."""
 
 OUTBOX = 1024
 """Requests that wait to be sent; the oldest is dropped first, and sent again by the client."""
@@ -104,6 +110,60 @@ def port_to(engine: RemotePort | Engine) -> tuple[RemotePort, LocalPort | None]:
         own = LocalPort(engine)
         return own, own
     return engine, None
+
+
+M = TypeVar("M", bound=Request)
+T = TypeVar("T")
+
+
+class Asking(ABC, Generic[M, T]):
+    """What sends requests by a port, each again until it's answered, and keeps what it heard, by number."""
+
+    def __init__(self, engine: RemotePort | Engine, resend: float) -> None:
+        """Reach an engine.
+
+        Args:
+            engine: A port, or an engine in this process.
+            resend: After how long without an answer a request is sent again [s], at first; longer and longer then.
+        """
+        self._port, self._own = port_to(engine)
+        self._port.join(self)
+        self._open: Resending[M] = Resending(resend)
+        self._kept: OrderedDict[int, T] = OrderedDict()
+        self._news: OrderedDict[int, None] = OrderedDict()
+
+    @abstractmethod
+    def receive(self, message: Reply, *, now: float) -> None:
+        """Take a reply at the user's time now [s]; those for others are passed over."""
+
+    def _keep(self, number: int, known: T, *, news: bool = True) -> None:
+        """Keep what is known of a request, and tell of it at the next `advance` where it's news."""
+        self._kept[number] = known
+        if news:
+            self._news[number] = None
+        for kept in (self._kept, self._news):
+            if len(kept) > REMEMBERED:
+                kept.popitem(last=False)
+
+    def advance(self, *, now: float) -> tuple[T, ...]:
+        """Send again what has no answer; what was heard since the last call."""
+        if self._own is not None:
+            self._own.advance(now=now)
+        for request in self._open.due(now):
+            self._port.send(request, now=now)
+        news = tuple(self._kept[number] for number in self._news if number in self._kept)
+        self._news.clear()
+        return news
+
+    def next_deadline(self) -> float | None:
+        """When something is sent again [s]; −∞ where something was heard, None for nothing to do."""
+        if self._news:
+            return -math.inf
+        return earliest(self._open.next_deadline(), None if self._own is None else self._own.next_deadline())
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._port.leave(self)
 
 
 class MemoryTransport:

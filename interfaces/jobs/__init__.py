@@ -1,7 +1,7 @@
 """Lists of jobs for a personal robot: what is to be done, how far it is, and the machine that gets it done."""
 
 from interfaces.jobs.file import JobFile, digest, read_jobs, written_jobs
-from interfaces.jobs.forecast import dry_run, time_needed
+from interfaces.jobs.forecast import dry_run
 from interfaces.jobs.runner import (
     ArmControl,
     CarryOut,
@@ -32,6 +32,5 @@ __all__ = [
     "dry_run",
     "read_jobs",
     "speaking_time",
-    "time_needed",
     "written_jobs",
 ]

@@ -67,11 +67,6 @@ def dry_run(
     return tuple(found)
 
 
-def time_needed(forecast: Forecast) -> float:
-    """For how long a list would take, times that nobody knows left out [s]."""
-    return forecast[-1].begins + (forecast[-1].lasts or 0.0) if forecast else 0.0
-
-
 def _lasts(job: Job, arm: Callable[[ArmJob], float | str | None]) -> float | str | None:
     match job:
         case VoiceJob():

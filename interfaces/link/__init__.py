@@ -13,7 +13,7 @@ from interfaces.link.delays import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, LinkTotals, Stream, direction
+from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, Stream, direction
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
 from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord, Totals
 from interfaces.link.quantiles import SlidingQuantiles
@@ -57,7 +57,6 @@ __all__ = [
     "LinkConditions",
     "LinkPath",
     "LinkStatistics",
-    "LinkTotals",
     "LossModel",
     "LossReason",
     "PacketLog",

@@ -19,9 +19,10 @@ import enum
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
+from typing import Annotated
 
 from interfaces.link.round_trip import RoundTrip
-from vrs.commands import finite
+from vrs.checks import at_least, finite, positive, validated, within
 from vrs.errors import InvalidValueError
 
 _ANCHORS = 32
@@ -29,36 +30,23 @@ _ANCHORS = 32
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class ClockSyncConfig:
     """What is known of B's clock, and how mapped times follow the estimate."""
 
-    max_drift: float = 200e-6
+    max_drift: Annotated[float, within(0.0, 0.01)] = 200e-6
     """Largest difference between B's rate and A's, as a share, in [0, 0.01]."""
-    smallest_step: float = 0.5
+    smallest_step: Annotated[float, at_least(0.0, "finite seconds ≥ 0")] = 0.5
     """B's clock steps by at least this [s], ≥ 0, or not at all. Round trips are intersected only where they are
     short enough to show such a step; at 0 each stands for itself."""
-    slew: float = 0.05
+    slew: Annotated[float, within(0.001, 0.5)] = 0.05
     """Largest difference between the rate of mapped time and A's, as a share, in [0.001, 0.5]."""
-    resolution: float = 1e-6
+    resolution: Annotated[float, at_least(0.0, "finite seconds ≥ 0")] = 1e-6
     """Largest error of rounding in one of B's stamps [s], ≥ 0."""
-    drift_window: float = 600.0
+    drift_window: Annotated[float, positive("finite seconds > 0")] = 600.0
     """Time over which the drift is measured [s], > 0."""
-    history: int = 1000
+    history: Annotated[int, within(2, 1_000_000)] = 1000
     """Corners of the map kept, in [2, 1,000,000]; earlier times are mapped with the oldest offset."""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.max_drift <= 0.01:
-            raise InvalidValueError("max_drift", self.max_drift, "in [0, 0.01]")
-        for name in ("smallest_step", "resolution"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InvalidValueError(name, getattr(self, name), "finite seconds ≥ 0")
-        if not 0.001 <= self.slew <= 0.5:
-            raise InvalidValueError("slew", self.slew, "in [0.001, 0.5]")
-        if not 0 < self.drift_window < math.inf:
-            raise InvalidValueError("drift_window", self.drift_window, "finite seconds > 0")
-        corners = self.history
-        if isinstance(corners, bool) or not isinstance(corners, int) or not 2 <= corners <= 1_000_000:
-            raise InvalidValueError("history", corners, "an integer in [2, 1,000,000]")
 
 
 class ClockEvidence(enum.StrEnum):

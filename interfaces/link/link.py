@@ -12,7 +12,7 @@ import numpy as np
 
 from interfaces.link.conditions import MAX_COUNT, Conditions, LinkConditions, LinkPath, Service
 from interfaces.link.delays import DelayProfile
-from interfaces.link.packets import MAX_RECORDS, LossReason, PacketLog, PacketRecord, Totals
+from interfaces.link.packets import MAX_RECORDS, LossReason, PacketLog, PacketRecord
 from vrs.checks import integer_in
 from vrs.commands import finite
 from vrs.errors import InvalidValueError
@@ -439,14 +439,6 @@ Direction: TypeAlias = Channel[T] | Stream[T]
 """One direction: datagrams, or a byte stream that sends again."""
 
 
-@dataclass(frozen=True, slots=True)
-class LinkTotals:
-    """Sums over all packets."""
-
-    forward: Totals
-    backward: Totals
-
-
 class Link(Generic[T, U]):
     """Two directions, T from the operator to the robot, U back, without input or output of their own.
 
@@ -475,10 +467,6 @@ class Link(Generic[T, U]):
         """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""
         both = (self.forward.next_deadline(), self.backward.next_deadline())
         return min((t for t in both if t is not None), default=None)
-
-    def totals(self) -> LinkTotals:
-        """What became of all packets so far."""
-        return LinkTotals(self.forward.log.totals(), self.backward.log.totals())
 
 
 def direction(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from interfaces.messages.control import LinkFigures
 
@@ -47,34 +47,34 @@ class PacketRecord:
     """How often it was sent: more than once on an in-order service that lost it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Totals:
     """Sums over all packets of one direction.
 
     sent + copies = arrived + discarded + the losses + those on their way.
     """
 
-    sent: int
+    sent: int = 0
     """Packets sent."""
-    copies: int
+    copies: int = 0
     """Second copies that the link made."""
-    arrived: int
+    arrived: int = 0
     """Deliveries, copies included."""
-    discarded: int
+    discarded: int = 0
     """Second copies that an in-order service discarded."""
-    lost: dict[str, int]
+    lost: dict[str, int] = field(default_factory=dict)
     """Packets lost, by reason; reasons that didn't occur aren't listed."""
-    resent: int
+    resent: int = 0
     """Times that an in-order service sent a packet again."""
-    bytes_sent: int
-    bytes_arrived: int
-    delay_mean: float | None
+    bytes_sent: int = 0
+    bytes_arrived: int = 0
+    delay_mean: float | None = None
     """Mean time between sending and delivery of what arrived [s]; None before the first."""
-    delay_min: float | None
+    delay_min: float | None = None
     """Shortest [s]."""
-    delay_max: float | None
+    delay_max: float | None = None
     """Longest [s]."""
-    forgotten: int
+    forgotten: int = 0
     """Records that nobody took in time."""
 
 
@@ -87,46 +87,46 @@ class PacketLog:
 
     def __init__(self, keep: int = MAX_RECORDS) -> None:
         self._records: deque[PacketRecord] = deque(maxlen=keep)
-        self._lost: Counter[str] = Counter()
-        self._sent = self._copies = self._arrived = self._discarded = self._resent = 0
-        self._bytes_sent = self._bytes_arrived = self._forgotten = 0
-        self._delay_sum, self._delay_min, self._delay_max = 0.0, math.inf, 0.0
+        self._totals = Totals()
+        self._delay_sum = 0.0
         self.told: Callable[[PacketRecord], None] | None = None
         """Is told what became of each packet, at once."""
 
     def sent(self, size: int) -> int:
         """Count a packet of `size` bytes that was sent, and return its number, from 0."""
-        self._sent += 1
-        self._bytes_sent += size
-        return self._sent - 1
+        self._totals.sent += 1
+        self._totals.bytes_sent += size
+        return self._totals.sent - 1
 
     def copied(self) -> None:
         """Count a second copy."""
-        self._copies += 1
+        self._totals.copies += 1
 
     def discarded(self) -> None:
         """Count a second copy that was thrown away on arrival."""
-        self._discarded += 1
+        self._totals.discarded += 1
 
     def resent(self) -> None:
         """Count another attempt."""
-        self._resent += 1
+        self._totals.resent += 1
 
     def settle(self, record: PacketRecord) -> None:
         """Keep what became of a packet."""
-        self._forgotten += len(self._records) == self._records.maxlen
+        totals = self._totals
+        totals.forgotten += len(self._records) == self._records.maxlen
         self._records.append(record)
         if self.told is not None:
             self.told(record)
         if record.lost is not None:
-            self._lost[record.lost.value] += 1
+            totals.lost[record.lost.value] = totals.lost.get(record.lost.value, 0) + 1
         elif record.arrived is not None:
             delay = record.arrived - record.sent
-            self._arrived += 1
-            self._bytes_arrived += record.size
+            totals.arrived += 1
+            totals.bytes_arrived += record.size
             self._delay_sum += delay
-            self._delay_min = min(self._delay_min, delay)
-            self._delay_max = max(self._delay_max, delay)
+            totals.delay_mean = self._delay_sum / totals.arrived
+            totals.delay_min = delay if totals.delay_min is None else min(totals.delay_min, delay)
+            totals.delay_max = delay if totals.delay_max is None else max(totals.delay_max, delay)
 
     def take(self) -> tuple[PacketRecord, ...]:
         """Hand over the records since the last call, in the order in which they became known."""
@@ -136,21 +136,7 @@ class PacketLog:
 
     def totals(self) -> Totals:
         """The sums so far."""
-        some = self._arrived > 0
-        return Totals(
-            sent=self._sent,
-            copies=self._copies,
-            arrived=self._arrived,
-            discarded=self._discarded,
-            lost=dict(sorted(self._lost.items())),
-            resent=self._resent,
-            bytes_sent=self._bytes_sent,
-            bytes_arrived=self._bytes_arrived,
-            delay_mean=self._delay_sum / self._arrived if some else None,
-            delay_min=self._delay_min if some else None,
-            delay_max=self._delay_max if some else None,
-            forgotten=self._forgotten,
-        )
+        return replace(self._totals, lost=dict(sorted(self._totals.lost.items())))
 
 
 WINDOW = 30.0

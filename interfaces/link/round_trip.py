@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
-from vrs.checks import finite, validated, within
+from vrs.checks import at_least, finite, positive, validated, within
 from vrs.errors import InvalidValueError
 
 SEQUENCE_NUMBERS = 1 << 16
@@ -98,14 +98,12 @@ class WindowConfig:
     """Most delays kept, in [1, 100,000]."""
     horizon: float = 60.0
     """Age at which a delay is forgotten [s], > 0; infinite for never."""
-    smoothing: float = 16.0
+    smoothing: Annotated[float, at_least(1.0, "a finite number of messages, at least 1")] = 16.0
     """Time constant of the jitter [messages], ≥ 1; RFC 3550 has 16."""
 
     def __post_init__(self) -> None:
         if not self.horizon > 0:
             raise InvalidValueError("horizon", self.horizon, "seconds > 0")
-        if not 1 <= self.smoothing < math.inf:
-            raise InvalidValueError("smoothing", self.smoothing, "a finite number of messages, at least 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,19 +111,14 @@ class WindowConfig:
 class ProbeConfig:
     """How a link is probed."""
 
-    period: float = 0.1
+    period: Annotated[float, positive("finite seconds > 0")] = 0.1
     """Time between probes [s], > 0."""
-    timeout: float = 5.0
+    timeout: Annotated[float, positive("finite seconds > 0")] = 5.0
     """Time after which a probe counts as lost [s], > 0; a later echo is refused."""
     most_in_flight: Annotated[int, within(1, SEQUENCE_NUMBERS // 2)] = 256
     """Most probes that wait for their echo, in [1, 32768]; no more are sent meanwhile."""
     window: WindowConfig = field(default_factory=WindowConfig)
     """What the statistics look back on."""
-
-    def __post_init__(self) -> None:
-        for name in ("period", "timeout"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InvalidValueError(name, getattr(self, name), "finite seconds > 0")
 
 
 @dataclass(frozen=True, slots=True)

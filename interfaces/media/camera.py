@@ -13,7 +13,8 @@ from typing import Final, TypeAlias
 from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.system import module_process
 from robots.bullet.rooms import Room
-from robots.ipr.camera import Lens, PanTilt, PanTiltConfig
+from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
+from robots.robot import USUAL_BASE
 from vrs.checks import number_in
 from vrs.clock import Clock
 from vrs.errors import FormatError, VrsError
@@ -59,6 +60,8 @@ class CameraConfig:
     """How it can be turned."""
     video: bool = True
     """Whether there's video; else only single pictures are made."""
+    robot: str = USUAL_BASE
+    """What `robots.load` finds the robot by in whose head it is."""
 
     def __post_init__(self) -> None:
         number_in("camera", self.rate, 1.0, 30.0, unit=" pictures a second")
@@ -187,7 +190,9 @@ class LiveCamera:
                 await asyncio.sleep(_LOOK)
             config = self.config
             try:
-                async with camera_process(Setup(self._room, config.lens, config.rate, config.video)) as ask:
+                async with camera_process(
+                    Setup(config.robot, self._room, config.lens, config.rate, config.video)
+                ) as ask:
                     self.problem = ""
                     await self._shoot(ask)
             except (CameraError, OSError) as error:

@@ -12,7 +12,8 @@ import sys
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
 from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
-from robots.ipr.camera import Look, Sight
+from robots.mobile.camera import Look, Sight
+from robots.robot import HeadCamera, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError
 
@@ -27,7 +28,7 @@ def run(connection: socket.socket) -> int:
         connection: To the site; its first message is the setup.
 
     Returns:
-        The exit status: 0, or 2 if something came that isn't a message.
+        The exit status: 0, or 2 if something came that isn't a message, or the robot has no camera.
     """
     with contextlib.suppress(OSError):
         os.nice(NICE)
@@ -35,7 +36,10 @@ def run(connection: socket.socket) -> int:
         setup = _order(connection)
         if not isinstance(setup, Setup):
             return 0 if setup is None else 2
-        sight, lens = Sight(setup.room, setup.lens), setup.lens
+        camera, lens = load(setup.robot).device(HeadCamera), setup.lens
+        if camera is None:
+            return 2
+        sight = Sight(setup.room, camera, lens)
         video = video_encoder(lens.width, lens.height, setup.rate) if setup.video else None
         connection.sendall(encode(None))
         clock = WallClock()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Hashable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from interfaces.media.camera import CameraConfig, LiveCamera, Stand
@@ -54,7 +55,7 @@ class LiveMedia:
         self.missing = missing() if config.video else ""
         """What there's no video and sound for want of; empty with the whole extra."""
         video = config.video and not self.missing
-        self.camera = LiveCamera(CameraConfig(config.rate, config.lens, config.pan_tilt, video), room, clock, stand)
+        self.camera = LiveCamera(replace(config, video=video), room, clock, stand)
         self._playout = VoicePlayout()
         audible = video and program() is not None
         self.presenter = Presenter(clock, self._playout, screen=screen, audible=audible)

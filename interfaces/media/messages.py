@@ -7,7 +7,7 @@ from typing import Final, TypeAlias, TypeVar
 import msgspec
 
 from robots.bullet.rooms import Room
-from robots.ipr.camera import Lens
+from robots.mobile.camera import Lens
 from vrs.errors import FormatError
 
 MESSAGE_MOST: Final = 1 << 24
@@ -19,6 +19,8 @@ HEAD: Final = 4
 class Setup(msgspec.Struct, frozen=True, tag=True):
     """Site: what is to be seen, and how; the first message."""
 
+    robot: str
+    """What `robots.load` finds the robot by that has the camera."""
     room: Room
     lens: Lens
     rate: float

@@ -181,6 +181,11 @@ def may_send(role: Role, sender: Party) -> bool:
     return sender in _PARTIES[role]
 
 
+def covers(role: Role, other: Role) -> bool:
+    """Whether a client of a role may send all that one of another may."""
+    return _PARTIES[role] >= _PARTIES[other]
+
+
 class ProblemCode(enum.StrEnum):
     """Why a message wasn't taken, or a connection ends."""
 
@@ -435,9 +440,9 @@ class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="st
     """[t, joints]: measurements that came after later ones, one of six; each for 0.2 s, so some come twice."""
 
 
-Question: TypeAlias = (
-    Hello | Ping | Pong | Acquire | TakeOver | Share | Release | Resume | Beat | Survey | Impair | Problem
-)
+LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume
+"""What a client asks of the lease; a `Lease` or a `Problem` answers it."""
+Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem
 """Control messages that a client sends."""
 Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network
 """Control messages that a server sends."""

@@ -144,9 +144,14 @@ ArcRow = tuple[Time, Coordinate, Coordinate, Coordinate, Speed, Speed, Seconds]
 ArcRows = Annotated[tuple[ArcRow, ...], Meta(max_length=MOST_REPEATED)]
 
 
-def arc_rows(arcs: Iterable[ArcSegment]) -> tuple[ArcRow, ...]:
-    """Arcs as they cross: what is computed of ordinary numbers may be subnormal, which a robot refuses."""
-    rows = ((arc.start, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs)
+def arc_rows(arcs: Iterable[ArcSegment], began: float = 0.0) -> tuple[ArcRow, ...]:
+    """Arcs as they cross: what is computed of ordinary numbers may be subnormal, which a robot refuses.
+
+    Args:
+        arcs: Of the operator's path.
+        began: When the drive began that they count from [s].
+    """
+    rows = ((arc.start - began, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs)
     return tuple(tuple(map(normal, row)) for row in rows)  # type: ignore[misc]
 
 

@@ -30,7 +30,7 @@ MOST_NAMES = 1000
 MOST_POINTS = 720
 """Of a scan, or a route."""
 
-_DIGITS = re.compile(r"[1-9][0-9]{0,19}")
+_DIGITS = r"\A[1-9][0-9]{0,19}\Z"
 
 CommandId = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
@@ -199,7 +199,7 @@ CROSSING: Mapping[type, Any] = {
     np.ndarray: Joints,
     Twist: Annotated[list[Value], Meta(min_length=6, max_length=6)],
     Pose: Annotated[list[_Row], Meta(min_length=4, max_length=4)],
-    Epoch: Annotated[str, Meta(pattern=r"\A[1-9][0-9]{0,19}\Z")],
+    Epoch: Annotated[str, Meta(pattern=_DIGITS)],
 }
 """What stands on the wire for what msgspec doesn't know, as `plain` writes and `rich` reads it."""
 
@@ -215,7 +215,7 @@ def epoch_of(digits: object) -> Epoch:
     Raises:
         ValueError: If they stand for none.
     """
-    if not isinstance(digits, str) or not _DIGITS.fullmatch(digits):
+    if not isinstance(digits, str) or not re.match(_DIGITS, digits):
         raise ValueError("Expected the digits of an epoch, without leading zeros")
     return Epoch(int(digits))
 

@@ -148,11 +148,6 @@ class JobList(Record, frozen=True, omit_defaults=True, gc=False):
             if isinstance(job, MoveJob):
                 self.goal(job)
 
-    @property
-    def next_number(self) -> int:
-        """A number for one more job."""
-        return max((job.number for job in self.jobs), default=0) + 1
-
     def goal(self, move: MoveJob) -> Goal:
         """Where a move goes.
 
@@ -165,26 +160,6 @@ class JobList(Record, frozen=True, omit_defaults=True, gc=False):
             known = ", ".join(self.places) or "none"
             raise InvalidValueError("to", move.to, f"a goal, or a place of this list ({known})")
         return self.places[move.to]
-
-    def added(self, job: Job, at: int | None = None) -> JobList:
-        """With one more job, before the one at an index; at the end unless given."""
-        place = len(self.jobs) if at is None else self._index(at, len(self.jobs))
-        return replace(self, jobs=(*self.jobs[:place], job, *self.jobs[place:]))
-
-    def removed(self, number: int) -> JobList:
-        """Without a job."""
-        k = self.index(number)
-        return replace(self, jobs=self.jobs[:k] + self.jobs[k + 1 :])
-
-    def changed(self, number: int, job: Job) -> JobList:
-        """With another job in the place of one."""
-        k = self.index(number)
-        return self.removed(number).added(job, k)
-
-    def moved(self, number: int, to: int) -> JobList:
-        """With a job at another index."""
-        rest = self.removed(number)
-        return rest.added(self.jobs[self.index(number)], to)
 
     def with_place(self, name: str, goal: Goal) -> JobList:
         """With a place of that name, in place of any other that has it."""
@@ -200,10 +175,6 @@ class JobList(Record, frozen=True, omit_defaults=True, gc=False):
             if job.number == number:
                 return k
         raise InvalidValueError("number", number, "that of a job of this list")
-
-    @staticmethod
-    def _index(value: int, most: int) -> int:
-        return int(number_in("index", value, 0, most))
 
 
 class JobStage(enum.StrEnum):

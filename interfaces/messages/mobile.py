@@ -120,6 +120,9 @@ class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"
     """As in `state`."""
     messages: Annotated[tuple[tuple[Time, Time | None], ...], Meta(max_length=MOST_MESSAGES)] = ()
     """As in `state`."""
+    drawn: Posture | None = None
+    """Where the virtual robot is drawn, where the posture estimator has it now; absent where that's `virtual`, as
+    in architectures without one."""
 
 
 class TaskOrder(Leased, frozen=True, omit_defaults=True, gc=False, tag="task"):

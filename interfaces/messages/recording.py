@@ -68,24 +68,26 @@ class GridFacts(Record, frozen=True, omit_defaults=True, gc=False):
     """Lower left corner of the first cell [m]."""
 
 
-class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False):
+class DriveFacts(Record, frozen=True, omit_defaults=True, gc=False, kw_only=True):
     """How a mobile robot's run was set up."""
 
-    body: Literal["ipr", "micro", "bare"]
-    """Which robot of its family."""
+    body: Word
+    """Which robot, by its name; `bare`: the usual one with its bare body."""
     architecture: Word
     """By its name, as `vrs lab --architecture` takes it."""
     transport: Literal["stream", "datagrams"]
     operator: Word
-    """Who drove, as `vrs lab --operator` takes it."""
-    length: Seconds
-    """For how long the operator drove [s]."""
+    """Who drove, as `vrs lab --operator` takes it; `live` of people."""
+    length: Seconds | None = None
+    """For how long the operator drove [s]; None where that wasn't settled beforehand, as live."""
     period: Seconds
     """T: between two commands [s]."""
     position: Word
     """What told the real robot where it was."""
     grid: GridFacts | None = None
     """Of the virtual environment; None where there was none."""
+    newest: Count = 0
+    """Highest command id given out where the recording begins in the middle of a session."""
 
 
 class ThingEntry(Record, frozen=True, omit_defaults=True, gc=False):
@@ -117,7 +119,7 @@ class ThingEntry(Record, frozen=True, omit_defaults=True, gc=False):
 
 
 class RoomEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="room"):
-    """Where it was: written at the beginning, and once more at the end."""
+    """Where it was: written at the beginning and at the end, live as its clock is known; the newest counts."""
 
     name: Word
     length: Size
@@ -158,7 +160,7 @@ class VirtualPosture(PostureSample, frozen=True, omit_defaults=True, gc=False):
 
 
 class RealPosture(PostureSample, frozen=True, omit_defaults=True, gc=False, kw_only=True):
-    """The real robot, truly, 20 times a second; and what it's told to drive from then on."""
+    """The real robot, truly, live where it takes itself to be, 20 times a second; and what it's told to drive."""
 
     v: Speed
     """What it's told to drive [m/s]."""
@@ -301,7 +303,7 @@ class CommandRecord(Entry, frozen=True, omit_defaults=True, gc=False, eq=False, 
     """A command that the operator's engine was given, and what became of it; rejected ones too."""
 
     number: Number
-    """Counts a recording's commands and anchors, from 1; 0 where it isn't in one yet."""
+    """Counts a recording's commands, anchors and placements, from 1; 0 where it isn't in one yet."""
     at: Time
     """The engine's clock, exactly [s]."""
     command: Command | None = None
@@ -473,6 +475,19 @@ class Anchor(SegmentedEntry, frozen=True, omit_defaults=True, gc=False, eq=False
             InvalidValueError: If it's none.
         """
         return Timeline(self.initial, self.start, following(self.segments, self.start), self.version)
+
+
+class Placement(Entry, frozen=True, omit_defaults=True, gc=False, tag="placed"):
+    """The virtual robot was put where the real one stands: a drive began, or the real one drives by itself."""
+
+    number: Number
+    """Counts a recording's commands and placements, from 1."""
+    at: Time
+    """The engine's clock, exactly [s]."""
+    posture: Posture
+    """x, y, θ from then on [m, m, rad]."""
+    along: bool = False
+    """Whether the real one drives by itself, and the virtual one goes along with it."""
 
 
 class ReceiptEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="receipt"):

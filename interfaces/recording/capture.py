@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from typing_extensions import override
@@ -20,26 +20,30 @@ from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.messages.recording import (
     Anchor,
-    ChangeEntry,
+    CellsEntry,
     CommandRecord,
     Direction,
+    EditEntry,
     GivenEntry,
     HistoryEntry,
     Late,
     LinkEntry,
+    Placement,
     ReceiptEntry,
+    RunEvent,
     Site,
-    VirtualSample,
 )
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
-from interfaces.recording.history import edit_entries, whole_entries
+from interfaces.recording.history import AnyTimeline, edit_entries, whole_entries
+from interfaces.recording.kinds import ARM, MOBILE
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
-from interfaces.teleop import Correction, OperatorSite
+from interfaces.teleop import Correction
 from interfaces.teleop.operator import SiteObserver
 from vrs.commands import Profile
+from vrs.engine import Engine, MobileEngine
 from vrs.ledger import Receipt, Standing, Status
-from vrs.model import Array, RobotModel
+from vrs.model import Array
 from vrs.timeline import Timeline
 
 MOST_AT_ONCE = 1200
@@ -54,6 +58,10 @@ _WATCHED = 64
 """Newest commands whose receipts are looked at for changes."""
 
 
+Cell: TypeAlias = tuple[int, int]
+"""Of the virtual environment: along x, along y."""
+
+
 class Put(Protocol):
     """What a capture writes with."""
 
@@ -61,15 +69,18 @@ class Put(Protocol):
         """Take a message of a time [s]."""
 
 
+_What: TypeAlias = CommandRecord | Placement | tuple[Correction, Timeline]
+
+
 class _Happened(NamedTuple):
-    """A command or a correction, and the timelines before and after it."""
+    """A command, a correction or a placement, and the timelines before and after it."""
 
-    what: CommandRecord | tuple[Correction, Timeline]
-    before: Timeline
-    after: Timeline
+    what: _What
+    before: AnyTimeline
+    after: AnyTimeline
 
 
-class Capture(SiteObserver):
+class Capture(SiteObserver[Report, Timeline]):
     """Writes down an operator's site: it listens, and writes what is due when it's told the time.
 
     While it listens it only takes notes: commands don't wait for it.
@@ -77,30 +88,30 @@ class Capture(SiteObserver):
 
     def __init__(
         self,
-        operator: OperatorSite,
-        model: RobotModel,
+        engine: Engine,
         *,
         now: float,
         step: float,
         every: bool,
         most_before: int = MOST_BEFORE,
-        apart: bool = False,
     ) -> None:
         """Begin with a site, at its start or in the middle.
 
+        Who makes this lets it listen to the site, and writes what `first` gives before anything else.
+
         Args:
-            operator: The site; this becomes its listener.
-            model: The robot.
+            engine: The site's.
             now: By the operator's clock [s].
             step: Between two samples of the virtual robot [s].
             every: Whether receipts name every command that they shifted or superseded, however many.
             most_before: See `MOST_BEFORE`.
-            apart: Whether somebody else writes what `first` gives, before anything else.
         """
-        self.operator, self.model, self.step, self._every = operator, model, step, every
+        self.engine, self.model, self.step, self._every = engine, engine.model, step, every
+        self.kind = MOBILE if isinstance(engine, MobileEngine) else ARM
+        """Of the robot."""
         self.put: Put | None = None
         """Takes what is written; None at first, and when nothing can be written any more."""
-        self._timeline = timeline = operator.engine.timeline
+        self._timeline = timeline = engine.timeline
         self._cut = max(min(timeline.index_at(now) - 2, len(timeline) - most_before), 0)
         self._happened: deque[_Happened] = deque()
         self._due: list[tuple[float, Message]] = []
@@ -108,16 +119,15 @@ class Capture(SiteObserver):
         self._row = math.ceil(now / step - 1e-9)
         self._linked = {"forward": now, "backward": now}
         self._known: dict[int, int] = {}
+        self._cells: set[Cell] = set()
+        self._ever: set[Cell] = set()
         self._pose = Paced(POSE_RATE)
         self.links = Paced(LINK_RATE)
         """When links of the virtual robot are shown."""
-        fresh = not operator.engine.newest and not len(timeline) and timeline.start == now
-        self.late = None if fresh else operator.engine.standing()
-        """How the engine stood; None where nothing had happened yet."""
+        fresh = not engine.newest and not len(timeline) and timeline.start == now
+        self.late = None if fresh or self.kind is MOBILE else engine.standing()
+        """How an arm's engine stood; None where nothing had happened yet."""
         self._began = timeline, now
-        operator.listener = self
-        for message in () if apart else self.first():
-            self.add(now, message)
 
     def first(self) -> Iterator[Message]:
         """What a recording begins with: the timeline so far, and commands that aren't over. From any thread."""
@@ -134,6 +144,32 @@ class Capture(SiteObserver):
         """Note a correction."""
         self._note((correction, truth))
 
+    def place(self, engine: Engine, at: float, *, along: bool = False) -> None:
+        """Note that a virtual base begins a drive.
+
+        Args:
+            engine: Of that drive.
+            at: When [s].
+            along: Whether it only goes along with the real one, which drives by itself.
+        """
+        self.tell_happened()
+        self._known.clear()
+        self.engine = engine
+        x, y, theta = engine.timeline.initial.tolist()
+        self._note(Placement(0, at, (x, y, theta), along))
+
+    def learn(self, t: float, cells: Iterable[Cell]) -> None:
+        """Note the cells of the virtual environment at a time [s]; events: some are new, all are gone."""
+        now, before = set(cells), self._cells
+        if now == before:
+            return
+        self.add(t, CellsEntry(t, _flat(sorted(now - before)), _flat(sorted(before - now))))
+        if new := len(now - self._ever):
+            self.add(t, RunEvent(t, "learned", f"the virtual environment learned {new} cell{'s' * (new > 1)}"))
+        elif not now:
+            self.add(t, RunEvent(t, "forgot", "the virtual environment forgot all that it had learned"))
+        self._cells, self._ever = now, self._ever | now
+
     @override
     def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
         """Note an answer of the robot's."""
@@ -149,38 +185,39 @@ class Capture(SiteObserver):
         """Let a run in virtual time fail: what it records is all that comes of it."""
         raise error
 
-    def _note(self, what: CommandRecord | tuple[Correction, Timeline]) -> None:
-        before, self._timeline = self._timeline, self.operator.engine.timeline
+    def _note(self, what: _What) -> None:
+        before, self._timeline = self._timeline, self.engine.timeline
         self._happened.append(_Happened(what, before, self._timeline))
         if len(self._happened) >= _WAITING:
-            self._tell_happened()
+            self.tell_happened()
             self.write_out()
 
     def add(self, t: float, message: Message) -> None:
         """Let a message of a time [s] be written."""
         self._due.append((t, message))
 
-    def show(
-        self,
-        paced: Paced,
-        t: Array,
-        q: Array,
-        kinematics: Callable[[Array], Array],
-        message: Callable[[float, Array], Message],
-    ) -> None:
-        """Let a robot be shown, as often as it's due.
+    def show(self, paced: Paced, t: Array, q: Array, message: Callable[[float, Array, str], Message]) -> None:
+        """Let a robot's pose be shown, as often as it's due.
 
         Args:
             paced: Chooses when.
             t: Ascending times [s], (k,).
-            q: Joints [rad], (k, n).
-            kinematics: Poses (m, 4, 4), or of all links (m, n + 1, 4, 4), of joints (m, n).
-            message: Made of a time [s] and what the kinematics say of the joints then.
+            q: Joints or postures, (k, n).
+            message: Made of a time [s], the pose then, and the frame that it's in.
         """
         rows = paced.chosen(t, q)
         if rows:
-            for now, X in zip(t[rows].tolist(), kinematics(q[rows]), strict=True):
-                self.add(now, message(now, X))
+            for now, X in zip(t[rows].tolist(), self.kind.poses(self.model, q[rows]), strict=True):
+                self.add(now, message(now, X, self.kind.frame))
+
+    def show_links(self, paced: Paced, t: Array, **robots: Array) -> None:
+        """Let all links of robots, `virtual` and `real`, be shown at once; see `show`."""
+        rows = paced.chosen(t, np.hstack([*robots.values()]))
+        if rows:
+            times = t[rows].tolist()
+            chosen = {name: q[rows] for name, q in robots.items()}
+            for now, frames in zip(times, self.kind.frames(self.model, times, chosen), strict=True):
+                self.add(now, frames)
 
     def link(self, direction: Direction, records: Iterable[PacketRecord]) -> None:
         """Write down what became of packets, in the order in which it was known."""
@@ -189,11 +226,11 @@ class Capture(SiteObserver):
             t = self._linked[direction] = max(self._linked[direction], known)
             self.add(t, entry)
 
-    def advance(self, *, now: float) -> tuple[Array, Array]:
+    def sample(self, *, now: float) -> tuple[Array, Array]:
         """Write down what is due; the virtual robot's times [s], (k,), and joints [rad], (k, n), for the driver."""
-        self._tell_happened()
+        self.tell_happened()
         t = self._times(now)
-        q = self.operator.engine.timeline.sample(t)
+        q = self.engine.timeline.sample(t)
         self._sample(t, q)
         return t, q
 
@@ -218,21 +255,24 @@ class Capture(SiteObserver):
         return t
 
     def _sample(self, t: Array, q: Array) -> None:
-        edits = [(at, message.edit) for at, message in self._due if isinstance(message, ChangeEntry | HistoryEntry)]
+        edits = [(at, message.edit) for at, message in self._due if isinstance(message, EditEntry | HistoryEntry)]
         since = edits[0][1] - 1 if edits else self._edit
         places = np.searchsorted([at for at, _ in edits], t, side="right").tolist()
         numbers = [max(since, 0), *(number for _, number in edits)]
         for row, (now, joints) in enumerate(zip(t.tolist(), q.tolist(), strict=True)):
-            self.add(now, VirtualSample(now, joints, numbers[places[row]]))
-        self.show(self._pose, t, q, self.model.forward, virtual_pose)
+            self.add(now, self.kind.sample(now, joints, numbers[places[row]]))
+        self.show(self._pose, t, q, virtual_pose)
 
-    def _tell_happened(self) -> None:
+    def tell_happened(self) -> None:
         """Write down what was noted."""
         changed = False
         while self._happened:
             what, before, after = self._happened.popleft()
             self._number += 1
-            if isinstance(what, CommandRecord):
+            if isinstance(what, Placement):
+                at, command_id = what.at, None
+                self.add(at, replace(what, number=self._number))
+            elif isinstance(what, CommandRecord):
                 at, receipt = what.at, None if what.receipt is None else self._named(what.receipt)
                 command_id = None if receipt is None else receipt.command_id
                 self.add(at, replace(what, number=self._number, receipt=receipt))
@@ -251,7 +291,7 @@ class Capture(SiteObserver):
 
     def _revise(self) -> None:
         """Write down receipts that later commands changed."""
-        engine = self.operator.engine
+        engine = self.engine
         for command_id in list(self._known)[:-_WATCHED]:
             del self._known[command_id]
         for command_id, version in self._known.items():
@@ -280,6 +320,10 @@ class Capture(SiteObserver):
         """Write down the truth about commands at a site, `virtual` or `real`, at a time [s]."""
         for receipt in receipts:
             self.add(t, ReceiptEntry(t, site, self._named(receipt)))
+
+
+def _flat(cells: Iterable[Cell]) -> tuple[int, ...]:
+    return tuple(number for cell in cells for number in cell)
 
 
 def link_entry(direction: Direction, record: PacketRecord, size: int = 0) -> tuple[float, LinkEntry]:

@@ -60,7 +60,7 @@ _SESSION = m.Begin, m.Dropped, m.End
 _COMMANDS = m.CommandRecord, m.Anchor, m.ReceiptEntry, m.CommandPacket, m.GivenEntry
 CHANNELS: Final = (
     RecordingChannel("/session", "vrs.Session", _SESSION, (*_SESSION, m.RoomEntry), many=False),
-    RecordingChannel("/commands", "vrs.Command", _COMMANDS, _COMMANDS, many=False),
+    RecordingChannel("/commands", "vrs.Command", _COMMANDS, (*_COMMANDS, m.Placement), many=False),
     RecordingChannel(
         "/timeline",
         "vrs.Timeline",

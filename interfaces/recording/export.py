@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,9 +16,11 @@ from interfaces.messages.description import described
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import Anchor, ArcEntry, CommandPacket, CommandRecord, LinkEntry, RunEvent
 from interfaces.recording.history import arm_timeline
+from interfaces.recording.kinds import ARM
 from interfaces.recording.poses import quaternions
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.recording import Deed, Recording
 from interfaces.recording.track import ESTIMATED, MEASURED
+from interfaces.runs.summary import UNIT
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline
@@ -29,7 +30,6 @@ _POSE = "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"
 _POSTURE = "x_m", "y_m", "theta_rad"
 _DRIVE = "v_m_per_s", "w_rad_per_s"
 _STAMPS = "issued_at_s", "asked_at_s", "execute_at_s", "end_s"
-_UNIT = re.compile(r"_((?:s|m|rad_or_m|rad|byte)(?:_per_s\d*)?)$")
 _KINDS: dict[type, type] = {kinds.FloatType: float, kinds.IntType: int, kinds.BoolType: bool}
 
 
@@ -46,7 +46,7 @@ class TableColumn(NamedTuple):
     @property
     def unit(self) -> str:
         """Empty where there's none."""
-        found = _UNIT.search(self.name)
+        found = UNIT.search(self.name)
         return found[1].replace("_per_", "/") if found else ""
 
 
@@ -66,7 +66,7 @@ def _fields(kind: type, values: Sequence[Any], *names: str) -> list[TableColumn]
     types = {field.name: field.type for field in described(kind).fields}
     found = []
     for name in names:
-        field = _UNIT.sub("", name)
+        field = UNIT.sub("", name)
         cells = [None if value is None else getattr(value, field) for value in values]
         found.append(TableColumn(name, _KINDS.get(type(types[field]), str), cells))
     return found
@@ -143,21 +143,22 @@ def _commands(recording: Recording) -> RecordingTable:
     )
 
 
-def _kind(entry: CommandRecord | Anchor) -> str:
-    if isinstance(entry, Anchor):
-        return "correction"
+def _kind(entry: Deed) -> str:
+    if not isinstance(entry, CommandRecord):
+        return "correction" if isinstance(entry, Anchor) else "placed"
     return "undo" if entry.command is None else str(entry.command.__struct_config__.tag)
 
 
-def _reason(entry: CommandRecord | Anchor) -> str:
+def _reason(entry: Deed) -> str:
     if isinstance(entry, Anchor):
         return entry.reason
-    return "" if entry.receipt is None else entry.receipt.reason
+    receipt = entry.receipt if isinstance(entry, CommandRecord) else None
+    return "" if receipt is None else receipt.reason
 
 
-def _content(entry: CommandRecord | Anchor) -> str | None:
+def _content(entry: Deed) -> str | None:
     """A command as JSON."""
-    if isinstance(entry, Anchor) or entry.command is None:
+    if not isinstance(entry, CommandRecord) or entry.command is None:
         return None
     return msgspec.json.encode(entry.command, enc_hook=plain).decode()
 
@@ -219,9 +220,8 @@ def _postures(recording: Recording, name: str, topic: str) -> RecordingTable:
 
 
 def _arcs(recording: Recording) -> RecordingTable:
-    """The newest timeline, a row an arc."""
-    timeline = recording.timeline
-    arcs = timeline.segments[:] if isinstance(timeline, ArcTimeline) else ()
+    """The newest timeline of each drive, a row an arc."""
+    arcs = [arc for drive in recording.drives if isinstance(drive, ArcTimeline) for arc in drive.segments]
     return _table(
         "segments",
         _rows([(number,) for number in range(len(arcs))], segment=int),

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import override
 
-from interfaces.messages.recording import COLLISION, OWN, Anchor, CommandPacket, CommandRecord, RunEvent
-from interfaces.recording.history import AnyTimeline, arm_timeline
-from interfaces.recording.recording import ARM, Recording
+from interfaces.messages.recording import (
+    COLLISION,
+    OWN,
+    Anchor,
+    CommandPacket,
+    CommandRecord,
+    DriveFacts,
+    RunEvent,
+)
+from interfaces.recording.history import AnyTimeline, arm_timeline, sampled
+from interfaces.recording.kinds import ARM
+from interfaces.recording.recording import Recording
 from interfaces.recording.rerun import Rerun, begun, rerun
 from interfaces.recording.run_recorders import extras_of
 from interfaces.recording.track import (
     ESTIMATED,
     GAP,
     MEASURED,
-    REAL,
-    REAL_POSTURE,
     SampleTrack,
     gap_lengths,
     not_measured,
@@ -30,7 +36,7 @@ from interfaces.runs.summary import Attribution, Json, OffsetOutcome, summarize
 from interfaces.runs.twin_run import ADAPTIVE, TwinRun, TwinSamples, carried_out, waits
 from interfaces.teleop import Correction
 from interfaces.teleop.architectures import Transport
-from robots.ipr.robot import Collision
+from robots.mobile.robot import Collision
 from robots.onboard.playout import PlayoutConfig
 from vrs.comparison import PathMatch, match_paths, measured_rows, resample
 from vrs.errors import FormatError, InvalidValueError
@@ -52,18 +58,8 @@ def matchable(postures: Array) -> bool:
     return bool(steps.sum() <= FARTHEST)
 
 
-class Follower(Protocol):
-    """Says of a real robot how it follows the virtual one."""
-
-    def play(self, t: float) -> float | None:
-        """The time of the timeline at which the real robot is at a time [s]; None where nobody knows."""
-
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """How far it's then from where the virtual robot was, or from its path, in the kind's `unit`."""
-
-
-class Pursuit(Follower):
-    """A recording's match, made when it's first asked for."""
+class Pursuit:
+    """How a real robot follows a virtual one's path: a recording's match, made when it's first asked for."""
 
     def __init__(self, recording: Recording) -> None:
         """Take a recording."""
@@ -115,8 +111,7 @@ class Pursuit(Follower):
         left = self._moments[before] + max(float(share), 0.0) * (self._moments[after] - self._moments[before])
         return min(t, float(left))
 
-    @override
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
+    def error(self, t: float, _q_real: Array, _play: float) -> float | None:
         """How far the real robot is beside the virtual one's path at a time [m]."""
         self.prepare()
         return None if self._match is None else float(np.interp(t, *self._beside))
@@ -132,94 +127,103 @@ def summary(recording: Recording) -> Json:
     Raises:
         FormatError: If the recording has too little of it.
     """
-    if recording.session.drive is None:
-        arm = figures(recording)
-        value, missing = summarize(arm.run, arm.attributions, arm.offsets), arm.missing
-    else:
-        found = driven(recording)
-        value, missing = figures_of(recording, found), found.missing
-    return value | {"missing": list(missing)} if missing else value
+    found = figures(recording)
+    return found.summary() | ({"missing": list(found.missing)} if found.missing else {})
 
 
-def _measured(recording: Recording, track: SampleTrack, t: Array, missing: list[str]) -> tuple[Array, Array, Array]:
-    """Play time [s], (k,), of the real robot, what was measured, and what it was told, at times [s], (k,)."""
-    rows = len(t)
-    if np.array_equal(track.t[:rows], t):
-        return track.play[:rows], track.q[:rows], track.reference[:rows]
-    missing += not_measured(track, t)
-    play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
-    q[track.unmeasured(t)] = np.nan
-    if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
-        raise FormatError(str(recording.path), f"holds no two samples of the real robot within {GAP} s")
-    return np.maximum.accumulate(play), q, reference
-
-
-def _damage(recording: Recording) -> list[str]:
-    """What is missing from the file."""
-    found = []
-    if recording.damage:
-        found.append(f"the recording is damaged: {recording.damage}")
-    if recording.dropped:
-        counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(recording.dropped.items()))
-        found.append(f"messages for which the disk was too slow: {counts}")
-    return found
-
-
-def _shown(recording: Recording, again: Rerun, until: float, missing: list[str]) -> AnyTimeline:
-    """The virtual robot's timeline: as the commands make it, which is exact, or by its recorded edits."""
-    if not again.missing and not again.difference:
-        return again.timeline
-    missing.append(f"the virtual robot is as its recorded edits have it, since {again.difference or again.missing}")
-    if recording.certain < until:
-        missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
-    return recording.timeline
-
-
-def figures(recording: Recording) -> RunFigures:
+def figures(recording: Recording) -> RunFigures | DriveFigures:
     """Everything that a run's summary and report are made of.
 
     Raises:
         FormatError: If the recording has too little of it: no model, no samples of the real robot.
     """
-    return RunFigures(recording)
+    return RunFigures(recording) if recording.kind is ARM else DriveFigures(recording)
 
 
-class RunFigures:
-    """A run of an arm's twins as its recording has it, put together when it's made."""
+class _Figures:
+    """A run as its recording has it."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording, self.begin, self.end = recording, recording.session, recording.end
         self._live = self.begin.driver == "live"
-        self._missing = _damage(recording)
+        self.missing: list[str] = []
+        """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
+        self._damage()
+        self._track = recording.track(recording.kind.real)
+
+    def _damage(self) -> None:
+        """Say what is missing from the file."""
+        recording = self.recording
+        if recording.damage:
+            self.missing.append(f"the recording is damaged: {recording.damage}")
+        if recording.dropped:
+            counts = ", ".join(f"{count} of {topic}" for topic, count in sorted(recording.dropped.items()))
+            self.missing.append(f"messages for which the disk was too slow: {counts}")
+
+    def _fail(self, problem: str) -> FormatError:
+        return FormatError(str(self.recording.path), problem)
+
+    def _measured(self, t: Array) -> tuple[Array, Array, Array]:
+        """Play time [s], (k,), of the real robot, what was measured, and what it was told, at times [s], (k,)."""
+        track, rows = self._track, len(t)
+        if np.array_equal(track.t[:rows], t):
+            return track.play[:rows], track.q[:rows], track.reference[:rows]
+        self.missing += not_measured(track, t)
+        play, q, reference = (track.on(t, column) for column in ("play", "q", "reference"))
+        q[track.unmeasured(t)] = np.nan
+        if len(track.gaps) == len(track.t) - 1 or not np.isfinite(q).any():
+            raise self._fail(f"holds no two samples of the real robot within {GAP} s")
+        return np.maximum.accumulate(play), q, reference
+
+    def _shown(self, again: Rerun, until: float) -> Sequence[AnyTimeline]:
+        """The virtual robot's timelines: as the commands make them, which is exact, or by its recorded edits."""
+        recording = self.recording
+        if not again.missing and not again.difference:
+            return again.drives
+        why = again.difference or again.missing
+        self.missing.append(f"the virtual robot is as its recorded edits have it, since {why}")
+        if recording.certain < until:
+            self.missing.append(f"edits of the virtual robot's timeline after {recording.certain:.3f} s")
+        return recording.drives
+
+    def _gap(self, t: Array) -> float:
+        """For how long nothing was measured of the real robot, between its samples [s]."""
+        return float(gap_lengths(self._track, t).sum())
+
+
+class RunFigures(_Figures):
+    """A run of an arm's twins as its recording has it, put together when it's made."""
+
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording)
         self.run = self._run()
         self.attributions, self.offsets = self._extras()
         """Its measures split among causes, and what other offsets made of the network; none where not recorded."""
-        self.missing = tuple(self._missing)
-        """What isn't in the recording, and what stands for it; nothing in a whole one of the laboratory."""
+
+    def summary(self) -> Json:
+        """The run's own summary."""
+        return summarize(self.run, self.attributions, self.offsets)
 
     def _extras(self) -> tuple[tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
         extras = None if self.end is None else self.end.extras
         if extras is None:
             if not self._live:
-                self._missing.append("what other runs say of the causes, and of other offsets")
+                self.missing.append("what other runs say of the causes, and of other offsets")
             return (), ()
         return extras_of(extras, str(self.recording.path))
 
     def _run(self) -> TwinRun:
         """The run on its even grid."""
-        recording, begin = self.recording, self.begin
-        if recording.kind is not ARM:
-            raise FormatError(str(recording.path), "of a mobile robot, which has no joints")
-        track = recording.track(REAL)
+        recording, begin, track = self.recording, self.begin, self._track
         t = self._grid(track)
-        play, q_real, q_reference = _measured(recording, track, t, self._missing)
+        play, q_real, q_reference = self._measured(t)
         measured = measured_rows(q_real)
         again = rerun(recording)
-        shown = arm_timeline(_shown(recording, again, math.inf, self._missing))
+        shown = arm_timeline(self._shown(again, math.inf)[-1])
         corrections = self._corrections()
         alone = self._alone() if corrections else shown
         if not np.isfinite(q_reference).all():
-            self._missing.append("the real robot's own references: the virtual robot's timeline stands for its")
+            self.missing.append("the real robot's own references: the virtual robot's timeline stands for its")
             q_reference = np.where(np.isfinite(q_reference), q_reference, shown.sample(play))
         receipts = again.receipts if shown is again.timeline else recording.receipts("virtual")
         if begin.late is not None:
@@ -243,7 +247,7 @@ class RunFigures:
             messages=messages,
             corrections=corrections,
             events=self._events(t, play, q_reference, measured),
-            gap_s=float(gap_lengths(track, t).sum()),
+            gap_s=self._gap(t),
             samples=self._samples(track, alone, shown),
         )
 
@@ -251,7 +255,7 @@ class RunFigures:
         """User times of the run [s], (k,): even ones."""
         step, known = self.begin.step, track.t
         if not len(known):
-            raise FormatError(str(self.recording.path), "holds no samples of the real robot to compare with")
+            raise self._fail("holds no samples of the real robot to compare with")
         start = 0.0
         if self.begin.sampled is not None:
             # Times of every other sample, but where the body was late.
@@ -264,9 +268,9 @@ class RunFigures:
         if self.end is not None and not self._live:
             last = round(self.end.t / step)
         if last - first < 1:
-            raise FormatError(str(self.recording.path), "holds less than two samples of the real robot")
+            raise self._fail("holds less than two samples of the real robot")
         if last - first >= MOST_ROWS:
-            raise FormatError(str(self.recording.path), f"is longer than the {MOST_ROWS} samples that are compared")
+            raise self._fail(f"is longer than the {MOST_ROWS} samples that are compared")
         t: Array = start + step * np.arange(first, last + 1, dtype=np.float64)
         return t
 
@@ -301,7 +305,7 @@ class RunFigures:
     def _packets(self, answers: tuple[Receipt, ...], messages: Array) -> tuple[CommandPacket, ...]:
         if not self._live:
             if self.end is None:
-                self._missing.append("what became of commands that weren't answered yet")
+                self.missing.append("what became of commands that weren't answered yet")
             return self.recording.packets
         # The operator's site doesn't know when a command reached the robot, but when it left the emulated link.
         messages = messages[np.argsort(messages[:, 0], kind="stable")]
@@ -360,91 +364,87 @@ def _is_number(value: Any) -> bool:
 SCHEMA = "vrs-drive/1"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Driven:
-    """A run as its recording has it."""
+class DriveFigures(_Figures):
+    """A drive of a mobile robot as its recording has it, put together when it's made."""
 
-    drive: DriveRun
-    missing: tuple[str, ...]
-    """What isn't in the recording, and what stands for it; nothing in a whole one."""
-    gap_s: float
-    """For how long nothing was measured of the real robot, between its samples [s]."""
+    def __init__(self, recording: Recording) -> None:
+        super().__init__(recording)
+        t = self._grid()
+        _, real, drives = self._measured(t)
+        packets = [entry for entry in recording.link if entry.direction == "forward"]
+        track, case = self._track, self._case()
+        driven = self._facts.length or math.inf
+        taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < driven]
+        self.run = DriveRun(
+            case=case,
+            t=t,
+            virtual=self._virtual(t),
+            real=real,
+            measured=_sampled(recording, MEASURED, t),
+            estimated=_sampled(recording, ESTIMATED, t),
+            drives=drives,
+            offset=resample(track.t, (track.t - track.play)[:, None], t)[:, 0],
+            delays=np.array(taken).reshape(-1, 2),
+            touched=tuple(Collision(e.t, e.text) for e in recording.events if e.kind == COLLISION),
+            sent_bytes=sum(entry.size for entry in packets),
+            reported_bytes=sum(entry.size for entry in recording.link if entry.direction == "backward"),
+            learned=(),
+        )  # fmt: skip
 
+    def summary(self) -> Json:
+        """The run's own summary."""
+        t = self.run.t
+        return {
+            "schema": SCHEMA,
+            "title": self.begin.title,
+            "duration_s": float(t[-1] - t[0]),
+            "gap_s": self._gap(t),
+            **facts_of(row_of(self.run)),
+        }
 
-def figures_of(recording: Recording, found: Driven) -> dict[str, Any]:
-    """The figures of a run that was put together from its recording."""
-    return {
-        "schema": SCHEMA,
-        "title": recording.session.title,
-        "duration_s": float(found.drive.t[-1] - found.drive.t[0]),
-        "gap_s": found.gap_s,
-        **facts_of(row_of(found.drive)),
-    }
+    @property
+    def _facts(self) -> DriveFacts:
+        facts = self.begin.drive
+        assert facts is not None
+        return facts
 
+    def _case(self) -> DriveCase:
+        begin, facts = self.begin, self._facts
+        # Live, nothing is settled beforehand, and the robot alone knows what tells it where it is.
+        named = ("architecture", "operator") if self._live else ("architecture", "operator", "length", "position")
+        try:
+            same = {name: getattr(facts, name) for name in named}
+            same |= {"robot": facts.body, "known": self.recording.robot, "seed": begin.seed or 0}
+            return DriveCase(transport=Transport(facts.transport), delay=begin.delay, **same)
+        except InvalidValueError as error:
+            raise self._fail(f"its beginning: {error}") from None
 
-def driven(recording: Recording) -> Driven:
-    """The run, put together from its recording.
+    def _grid(self) -> Array:
+        """Times of the run [s], (k,): the samples' own where none is missing."""
+        step, t = self.begin.step, self._track.t
+        if len(t) < 2:
+            raise self._fail("holds less than two samples of the real robot")
+        if max(float(t[-1] - t[0]), abs(float(t[0]))) >= MOST_ROWS * step:
+            raise self._fail(f"is longer than the {MOST_ROWS} samples that are compared")
+        if self._live:
+            unmet, *others = self.recording.drives
+            # Until the robot was met, the virtual one stood somewhere else.
+            met = others[0].start if others and not len(unmet) else t[0]
+            # And a time in each gap, where nothing is known.
+            moments: Array = np.union1d(t, self._track.gaps.mean(axis=1))
+            return moments[moments >= met]
+        first, last = round(float(t[0]) / step), round(float(t[-1]) / step)
+        if last - first + 1 == len(t):
+            return t
+        even: Array = step * np.arange(first, last + 1, dtype=np.float64)
+        return even
 
-    Raises:
-        FormatError: If the recording has too little of it: no samples of the real robot, no known robot.
-    """
-    missing = _damage(recording)
-    track = recording.track(REAL_POSTURE)
-    t = _drive_grid(recording, track)
-    _, real, drives = _measured(recording, track, t, missing)
-    packets = [entry for entry in recording.link if entry.direction == "forward"]
-    case = _drive_case(recording)
-    taken = [(e.sent, e.arrived - e.sent) for e in packets if e.arrived is not None and e.sent < case.length]
-    drive = DriveRun(
-        case=case,
-        t=t,
-        virtual=_virtual_postures(recording, t, missing),
-        real=real,
-        measured=_sampled(recording, MEASURED, t),
-        estimated=_sampled(recording, ESTIMATED, t),
-        drives=drives,
-        offset=resample(track.t, (track.t - track.play)[:, None], t)[:, 0],
-        delays=np.array(taken).reshape(-1, 2),
-        touched=tuple(Collision(e.t, e.text) for e in recording.events if e.kind == COLLISION),
-        sent_bytes=sum(entry.size for entry in packets),
-        reported_bytes=sum(entry.size for entry in recording.link if entry.direction == "backward"),
-        learned=(),
-    )  # fmt: skip
-    return Driven(drive, tuple(missing), float(gap_lengths(track, t).sum()))
-
-
-def _drive_case(recording: Recording) -> DriveCase:
-    begin, facts = recording.session, recording.session.drive
-    if facts is None:
-        raise FormatError(str(recording.path), "of no mobile robot")
-    try:
-        same = {name: getattr(facts, name) for name in ("architecture", "operator", "length", "position")}
-        transport, seed = Transport(facts.transport), begin.seed or 0
-        return DriveCase(transport=transport, delay=begin.delay, robot=facts.body, seed=seed, **same)
-    except InvalidValueError as error:
-        raise FormatError(str(recording.path), f"its beginning: {error}") from None
-
-
-def _drive_grid(recording: Recording, track: SampleTrack) -> Array:
-    """Times of the run [s], (k,): the samples' own where none is missing."""
-    step, t, where = recording.session.step, track.t, str(recording.path)
-    if len(t) < 2:
-        raise FormatError(where, "holds less than two samples of the real robot")
-    if max(float(t[-1] - t[0]), abs(float(t[0]))) >= MOST_ROWS * step:
-        raise FormatError(where, f"is longer than the {MOST_ROWS} samples that are compared")
-    first, last = round(float(t[0]) / step), round(float(t[-1]) / step)
-    if last - first + 1 == len(t):
-        return t
-    whole: Array = step * np.arange(first, last + 1, dtype=np.float64)
-    return whole
-
-
-def _virtual_postures(recording: Recording, t: Array, missing: list[str]) -> Array:
-    """Postures of the virtual robot: as the commands make them, which is exact, or by its recorded edits."""
-    virtual = _shown(recording, rerun(recording), float(t[-1]), missing).sample(t)
-    if not matchable(virtual):
-        raise FormatError(str(recording.path), f"its virtual robot drives further than {FARTHEST:g} m")
-    return virtual
+    def _virtual(self, t: Array) -> Array:
+        """Postures of the virtual robot at times [s], (k, 3)."""
+        virtual = sampled(self._shown(rerun(self.recording), float(t[-1])), t)
+        if not matchable(virtual):
+            raise self._fail(f"its virtual robot drives further than {FARTHEST:g} m")
+        return virtual
 
 
 def _sampled(recording: Recording, topic: str, t: Array) -> Array:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from interfaces.engine_server.journal import SAME, changed, difference, first_unlike
 from interfaces.messages.recording import ArcChange, ArcHistory, ChangeEntry, HistoryEntry, following
+from vrs.clock import ManualClock
+from vrs.engine import Engine, MobileEngine
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import ArcPiece, ArcTimeline, wrapped
+from vrs.model import Array
 from vrs.segment import HOLD
 from vrs.timeline import Timeline
 
@@ -64,9 +72,11 @@ def _arc_change(
     before: ArcTimeline, after: ArcTimeline, edit: int, at: float, command_id: int | None
 ) -> ArcChange | None:
     """A mobile robot's edit; None where what was shifted along would come back otherwise, by a rounding error."""
+    if after.start != before.start or not np.array_equal(after.initial, before.initial):
+        return None
     since = min(before.index_at(at), after.index_at(at)) - 1
-    first = first_unlike(before, after, max(since, 0)) if after.start == before.start else 0
-    if after.start != before.start or len(after) - first > MOST_CHANGED:
+    first = first_unlike(before, after, max(since, 0))
+    if len(after) - first > MOST_CHANGED:
         return None
     entry = ArcChange(
         edit=edit,
@@ -154,6 +164,8 @@ class Chain:
         """Those that are known."""
         self.times: list[float] = []
         """When they were made [s], never descending."""
+        self.drives: list[AnyTimeline] = []
+        """The newest timeline of each drive, see `sampled`; of an arm there's one."""
         self.broken = False
         """Whether an edit after the newest known one is missing."""
 
@@ -196,8 +208,50 @@ class Chain:
         self._append(RecordedEdit(entry.edit, entry.at, made, entry.command_id))
 
     def _append(self, edit: RecordedEdit) -> None:
+        if self.drives and edit.timeline.start <= self.drives[-1].start:
+            self.drives.pop()
+        self.drives.append(edit.timeline)
         self.edits.append(edit)
         self.times.append(max(edit.at, self.times[-1] if self.times else edit.at))
+
+
+def placed(engine: Engine, posture: Sequence[float], clock: ManualClock) -> Engine:
+    """A virtual base that begins a drive, now.
+
+    Args:
+        engine: What it was before; ids of commands count on.
+        posture: Where it stands, (x, y, θ) [m, m, rad].
+        clock: The session's.
+
+    Raises:
+        InvalidValueError: If the engine is an arm's, or the posture is none.
+    """
+    lateness = engine.scheduler.lateness
+    made = MobileEngine(engine.model, posture=posture, clock=clock, lateness=lateness)  # type: ignore[arg-type]
+    made.count_from(engine.newest)
+    return made
+
+
+def sampled(drives: Sequence[AnyTimeline], t: ArrayLike) -> Array:
+    """Where the virtual robot is, of timelines each of which counts from where it starts.
+
+    Args:
+        drives: One or more, by their starts; before its start the first one counts.
+        t: [s], scalar or (k,).
+
+    Returns:
+        Joints or postures, (n,) or (k, n).
+    """
+    if len(drives) == 1:
+        return drives[0].sample(t)
+    moments = np.asarray(t)
+    if not moments.ndim:
+        return drives[max(bisect_right(drives, float(moments), key=attrgetter("start")) - 1, 0)].sample(t)
+    found: Array = np.empty((len(moments), len(drives[0].initial)))
+    which = np.searchsorted([drive.start for drive in drives[1:]], moments, side="right")
+    for index in np.unique(which).tolist():
+        found[which == index] = drives[index].sample(moments[which == index])
+    return found
 
 
 def whole(entry: HistoryEntry, parts: Sequence[Any]) -> AnyTimeline:

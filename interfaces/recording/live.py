@@ -3,29 +3,44 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from typing_extensions import override
 
 from interfaces.messages import fields
-from interfaces.messages.recording import Begin, CommandRecord, End, RealSample, RunEvent
+from interfaces.messages.drive_sites import DriveReport
+from interfaces.messages.recording import (
+    OWN,
+    Begin,
+    CommandRecord,
+    End,
+    MeasuredPosture,
+    RealPosture,
+    RealSample,
+    RunEvent,
+)
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.capture import Capture, late_of
+from interfaces.recording.channels import Message
+from interfaces.recording.drives import LiveDrives
 from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_file import Sink
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, link_transforms, real_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
-from interfaces.teleop import Correction, RobotLine
+from interfaces.teleop import Correction
+from interfaces.teleop.architectures.compositions import CONTROL
+from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.samples import PERIOD
+from interfaces.teleop.virtual_base import VirtualBase
+from robots.bullet.rooms import Room
 from vrs.ledger import Receipt, Status
-from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 RATE = 60.0
@@ -54,73 +69,23 @@ class LiveRecording:
     """Is told once why nothing more is recorded."""
     over: bool = True
     """Whether a file that's there already is written over."""
+    robot: str = ""
+    """Name of a mobile robot, which its model's needn't be; the model's unless given."""
+    room: Room | None = None
+    """Where a mobile robot drives."""
+    architecture: str = OWN
+    """What a mobile robot does with the operator's path, by its name, where that's known."""
 
 
-class _LiveCapture(Capture):
-    """A capture that knows the real robot by its reports."""
+class _Measured(NamedTuple):
+    """Where the real robot was at a time [s], and what is written of that."""
 
-    def __init__(self, line: RobotLine, model: RobotModel, now: float) -> None:
-        super().__init__(line.operator, model, now=now, step=1.0 / RATE, every=False, apart=True)
-        self._asked: OrderedDict[int, float] = OrderedDict()
-        self._since = now
-        self._samples: list[Sample] = []
-        self._halted = self._followed = False
-        self.failure = ""
-        """What raised while a note was taken; empty if nothing did."""
-
-    def commanded(self, deed: CommandRecord) -> None:
-        super().commanded(deed)
-        receipt = deed.receipt
-        if receipt is not None and receipt.status is not Status.REJECTED and receipt.execute_at is not None:
-            self._asked[receipt.command_id] = receipt.execute_at
-            if len(self._asked) > _ASKED:
-                self._asked.popitem(last=False)
-
-    def corrected(self, correction: Correction, truth: Timeline) -> None:
-        super().corrected(correction, truth)
-        for event in correction_events([correction], self.model.prismatic):
-            self.add(event.t, fields.cut(event))
-
-    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
-        super().answered(command_id, receipt, now=now)
-        asked = self._asked.pop(command_id, None)
-        if receipt.status is Status.REJECTED or receipt.execute_at is None:
-            self.tell(now, "diverged", f"the real robot rejected command {command_id}: {receipt.reason}")
-        elif asked is not None and receipt.execute_at > asked + _SAME:
-            late = f"executed at {receipt.execute_at:.3f} s instead of {asked:.3f} s"
-            self.tell(now, "late", f"command {command_id} was late at the real robot: {late}")
-
-    def reported(self, report: Report, *, now: float) -> None:
-        halted = bool(report.halted)
-        if halted and not self._halted and self._followed:
-            self.tell(now, "halted", f"the real robot stopped: {report.halted}")
-        elif not halted and (self._halted or not self._followed):
-            self.tell(now, "followed", "the real robot follows the operator")
-        self._halted, self._followed = halted, self._followed or not halted
-
-    @override
-    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
-        # What was measured before the recording began is compared with nothing in it.
-        self._samples += [one for one in samples if one.t >= self._since][: _SAMPLES - len(self._samples)]
-
-    def failed(self, error: Exception) -> None:
-        self.failure = str(error) or type(error).__name__
-
-    def tell(self, t: float, kind: str, text: str) -> None:
-        """Write down an event."""
-        self.add(t, RunEvent(t, kind, fields.text(text)))
-
-    def show_links(self, robot: str, paced: Paced, t: Array, q: Array) -> None:
-        """Let the links of a robot, `virtual` or `real`, be shown; see `show`."""
-        self.show(paced, t, q, self.model.links, lambda now, X: link_transforms(now, ((robot, X[1:]),)))
-
-    def samples(self) -> list[Sample]:
-        """Those that came since the last time, by time."""
-        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
-        return samples
+    t: float
+    q: Sequence[float]
+    messages: tuple[Message, ...]
 
 
-class LiveRecorder:
+class LiveRecorder(Capture):
     """Records an operator's site. `advance` takes its turns; a thread of the recorder's does the writing.
 
     It begins with a session, or in its middle; takes notes from when it's made, and writes once `open` has made a
@@ -128,55 +93,61 @@ class LiveRecorder:
     """
 
     def __init__(
-        self,
-        what: LiveRecording,
-        line: RobotLine,
-        model: RobotModel,
-        *,
-        seed: int,
-        began: float,
-        now: float = 0.0,
+        self, what: LiveRecording, line: SiteLine[Any, Any, Any], *, seed: int, began: float, now: float = 0.0
     ) -> None:
         """Begin to take notes.
 
         Args:
             what: What is recorded, and where to.
-            line: From the operator's site to the robot; nobody else listens to that site.
-            model: The robot.
+            line: From the operator's site, of any robot, to the robot; nobody else listens to that site.
             seed: Of the emulated link.
             began: Seconds since 1970 now.
             now: Session time [s].
         """
+        self._site, robot = line.operator, line.operator.robot
+        drives = LiveDrives(line.operator, what.room, now=now) if isinstance(robot, VirtualBase) else None
+        engine = robot.engine
+        step = 1.0 / RATE if drives is None else CONTROL
+        super().__init__(engine, now=now, step=step, every=False)
+        self._site.listener = self
         self.path, self.since = what.path, now
-        self._what, self._line, self._failed = what, line, what.failed
-        self._capture = _LiveCapture(line, model, now)
+        self._what, self._link, self._drives = what, line.link, drives
         for way in (line.link.forward, line.link.backward):
             way.log.take()
-        link, engine = line.link.conditions.forward, line.operator.engine
+        link, name = line.link.conditions.forward, engine.model.name
         self._begin = Begin(
             t=now,
-            robot=model.name,
+            robot=name,
             driver="live",
-            title=f"live {model.name}",
+            title=f"live {what.robot or name}",
             seed=seed,
             delay=fields.text(link.delay.name),
             offset=what.offset,
             service=str(link.service),
             link_loss=what.link_loss,
-            step=1.0 / RATE,
+            step=step,
             q=engine.timeline.sample(now).tolist(),
             lateness=str(engine.parameters["lateness"]),
             software=software(),
             began=began,
-            sampled=PERIOD,
-            late=late_of(self._capture.late),
+            sampled=PERIOD if drives is None else None,
+            late=late_of(self.late),
+            drive=None if drives is None else drives.facts(what.robot or name, what.architecture),
         )
         self.recorder: Recorder | None = None
         """Writes the file, once there is one."""
+        self._asked: OrderedDict[int, float] = OrderedDict()
+        self._samples: list[_Measured] = []
         self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
-        self._connected = self._told = False
-        self._stopped = ""
+        self._connected = self._halted = self._followed = False
+        self._stopped, self._told = "", False
         self._rest: tuple[End, tuple[Receipt, ...]] | None = None
+
+    @override
+    def first(self) -> Iterator[Message]:
+        if self._drives is not None:
+            yield from self._drives.place()
+        yield from super().first()
 
     def open(self) -> None:
         """Make the file, with what is known so far; from any thread.
@@ -186,18 +157,17 @@ class LiveRecorder:
         """
         sink = Sink.create(self.path, over=self._what.over)
         try:
-            self.recorder = Recorder(sink, self._begin, first=self._capture.first())
+            self.recorder = Recorder(sink, self._begin, first=self.first())
         except RecordingError:
             self.leave()
             raise
-        self._capture.put = self.recorder.put
+        self.put = self.recorder.put
 
     def leave(self) -> None:
         """Listen no more."""
-        capture = self._capture
-        capture.put = None
-        if capture.operator.listener is capture:
-            capture.operator.listener = None
+        self.put = None
+        if self._site.listener is self:
+            self._site.listener = None
 
     def advance(self, *, now: float, connected: bool) -> None:
         """Write down what is due at a time [s].
@@ -206,39 +176,96 @@ class LiveRecorder:
             now: Session time [s].
             connected: Whether the robot is heard of.
         """
-        capture = self._capture
-        if capture.failure and not self._stopped:
-            self.stop(capture.failure)
-        if capture.put is None:
+        if self.put is None:
             return
         self._look()
         if connected is not self._connected:
             self._connected = connected
             text = "the real robot is heard of" if connected else "the real robot isn't heard of any more"
-            capture.tell(now, "up" if connected else "down", text)
-        link = self._line.link
-        capture.link("forward", link.forward.log.take())
-        capture.link("backward", link.backward.log.take())
-        capture.show_links("virtual", capture.links, *capture.advance(now=now))
-        self._tell_samples(capture)
-        capture.write_out()
+            self.tell(now, "up" if connected else "down", text)
+        self.link("forward", self._link.forward.log.take())
+        self.link("backward", self._link.backward.log.take())
+        if self._drives is not None:
+            self._drives.follow(self, now=now)
+        t, q = self.sample(now=now)
+        self.show_links(self.links, t, virtual=q)
+        self._write_samples()
+        self.write_out()
 
-    def _tell_samples(self, capture: _LiveCapture) -> None:
-        samples = capture.samples()
+    def _write_samples(self) -> None:
+        """Write down what was measured of the real robot since the last time."""
+        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
         if not samples:
             return
-        t = np.array([sample.t for sample in samples])
-        q = np.array([sample.q for sample in samples])
-        for now, joints, sample in zip(t.tolist(), q.tolist(), samples, strict=True):
-            reference = None if sample.reference is None else sample.reference.tolist()
-            capture.add(now, RealSample(now, sample.play, joints, reference))
-        capture.show(self._real, t, q, capture.model.forward, real_pose)
-        capture.show_links("real", self._real_links, t, q)
+        t, q = np.array([sample.t for sample in samples]), np.array([sample.q for sample in samples])
+        for sample in samples:
+            for message in sample.messages:
+                self.add(sample.t, message)
+        self.show(self._real, t, q, real_pose)
+        self.show_links(self._real_links, t, real=q)
+
+    @override
+    def commanded(self, deed: CommandRecord) -> None:
+        super().commanded(deed)
+        receipt = deed.receipt
+        if receipt is not None and receipt.status is not Status.REJECTED and receipt.execute_at is not None:
+            self._asked[receipt.command_id] = receipt.execute_at
+            if len(self._asked) > _ASKED:
+                self._asked.popitem(last=False)
+
+    @override
+    def corrected(self, correction: Correction, truth: Timeline) -> None:
+        if self._drives is not None:
+            self.place(self._site.robot.engine, correction.t)
+            return
+        super().corrected(correction, truth)
+        for event in correction_events([correction], self.model.prismatic):
+            self.add(event.t, fields.cut(event))
+
+    @override
+    def answered(self, command_id: int, receipt: Receipt, *, now: float) -> None:
+        super().answered(command_id, receipt, now=now)
+        asked = self._asked.pop(command_id, None)
+        if receipt.status is Status.REJECTED or receipt.execute_at is None:
+            self.tell(now, "diverged", f"the real robot rejected command {command_id}: {receipt.reason}")
+        elif asked is not None and receipt.execute_at > asked + _SAME:
+            late = f"executed at {receipt.execute_at:.3f} s instead of {asked:.3f} s"
+            self.tell(now, "late", f"command {command_id} was late at the real robot: {late}")
+
+    @override
+    def reported(self, report: Report | DriveReport, *, now: float) -> None:
+        halted = bool(report.halted)
+        if halted and not self._halted and self._followed:
+            self.tell(now, "halted", f"the real robot stopped: {report.halted}")
+        elif not halted and (self._halted or not self._followed):
+            self.tell(now, "followed", "the real robot follows the operator")
+        self._halted, self._followed = halted, self._followed or not halted
+        if isinstance(report, DriveReport):
+            t, posture, drive = report.measured_at, report.posture, report.drive
+            # Its own measurement is all that's known of where it truly is.
+            real = RealPosture(t, *posture, v=drive.v, w=drive.w, D=report.D)
+            self._measure(t, posture, real, MeasuredPosture(t, *posture))
+
+    @override
+    def measured(self, samples: Sequence[Sample], *, now: float) -> None:
+        # Of a mobile robot reports say more.
+        for one in () if self._drives is not None else samples:
+            q, reference = one.q.tolist(), None if one.reference is None else one.reference.tolist()
+            self._measure(one.t, q, RealSample(one.t, one.play, q, reference))
+
+    def _measure(self, t: float, q: Sequence[float], *messages: Message) -> None:
+        """Take a sample; what was measured before the recording began is compared with nothing in it."""
+        if t >= self.since and len(self._samples) < _SAMPLES:
+            self._samples.append(_Measured(t, q, messages))
+
+    @override
+    def failed(self, error: Exception) -> None:
+        self.stop(str(error) or type(error).__name__)
 
     def tell(self, t: float, kind: str, text: str) -> None:
         """Write down an event of a kind at a time [s]."""
         if not self._stopped:
-            self._capture.tell(t, kind, text)
+            self.add(t, RunEvent(t, kind, fields.text(text)))
 
     @property
     def problem(self) -> str | None:
@@ -254,8 +281,8 @@ class LiveRecorder:
     def _look(self) -> None:
         """Tell of a problem that's new."""
         problem = self.problem
-        if problem and not self._told and self._failed is not None:
-            self._failed(problem)
+        if problem and not self._told and self._what.failed is not None:
+            self._what.failed(problem)
         self._told = problem is not None
 
     def finish(self, *, now: float) -> None:
@@ -268,7 +295,8 @@ class LiveRecorder:
         receipts: tuple[Receipt, ...] = ()
         if not self._stopped:
             self.advance(now=now, connected=self._connected)
-            receipts = self._capture.operator.engine.receipts
+            # Those of a mobile robot stand with its commands, and nothing changes them.
+            receipts = self.engine.receipts if self._drives is None else ()
             late = self._begin.late
             if late is not None:
                 receipts = tuple(one for one in receipts if one.command_id > late.newest)
@@ -277,7 +305,7 @@ class LiveRecorder:
 
     def close(self) -> None:
         """Write the last notes down, and close the file; from any thread, after `end`."""
-        recorder, capture = self.recorder, self._capture
+        recorder = self.recorder
         assert self._rest is not None
         end, receipts = self._rest
         if recorder is None:
@@ -286,9 +314,9 @@ class LiveRecorder:
             # What happened since isn't there: the file isn't whole.
             recorder.close(None)
         else:
-            capture.receipts(end.t, "virtual", receipts)
-            capture.whole(end.t)
-            recorder.close(end, last=[message for _, message in capture.taken()])
+            self.receipts(end.t, "virtual", receipts)
+            self.whole(end.t)
+            recorder.close(end, last=[message for _, message in self.taken()])
         self._look()
 
     def health(self) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.messages.recording import Anchor, CommandRecord, RunEvent
+from interfaces.messages.recording import Anchor, CommandRecord, Placement, RunEvent
 from interfaces.runs.twin_run import correction_text
 from vrs.commands import DriveCommand, Motion, MotionCommand
 from vrs.ledger import Receipt, Status
@@ -19,7 +19,7 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.recording.history import AnyTimeline, RecordedEdit
-    from interfaces.recording.recording import Recording
+    from interfaces.recording.recording import Deed, Recording
 
 CHANGED: Final = 1e-9
 """A predicted position that is off by more [rad] was falsified."""
@@ -92,18 +92,14 @@ class MarkReader:
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._marks: list[Mark] = []
+        self.marks: Sequence[Mark] = ()
+        """Those that were read so far."""
         self._times: list[float] = []
         self._told: list[Mark] = []
         self._happened: list[Mark] = []
         self._commands = self._edits = self._events = 0
         self.version = 0
         """Counts up whenever there are more marks."""
-
-    @property
-    def marks(self) -> Sequence[Mark]:
-        """Those that were read so far; not to be changed."""
-        return self._marks
 
     def read(self, most: int | None = None) -> bool:
         """Read on.
@@ -134,26 +130,26 @@ class MarkReader:
         elif not found:
             return self._commands < len(commands) or self._edits < len(edits)
         self._told += found
-        self._marks = sorted((*self._told, *self._happened), key=lambda mark: mark.t)
-        self._times = [mark.t for mark in self._marks]
+        self.marks = sorted((*self._told, *self._happened), key=lambda mark: mark.t)
+        self._times = [mark.t for mark in self.marks]
         self.version += 1
         return self._commands < len(commands) or self._edits < len(edits)
 
     def passed(self, since: float, until: float) -> Sequence[Mark]:
         """The marks after one place, up to another [s], in that order: backwards where that's earlier."""
         if until >= since:
-            return self._marks[bisect_right(self._times, since) : bisect_right(self._times, until)]
-        return self._marks[bisect_left(self._times, until) : bisect_left(self._times, since)][::-1]
+            return self.marks[bisect_right(self._times, since) : bisect_right(self._times, until)]
+        return self.marks[bisect_left(self._times, until) : bisect_left(self._times, since)][::-1]
 
     def latest(self, t: float) -> Mark | None:
         """The newest mark at a time [s]; None before the first."""
         count = bisect_right(self._times, t)
-        return self._marks[count - 1] if count else None
+        return self.marks[count - 1] if count else None
 
     def beside(self, t: float, *, back: bool) -> Mark | None:
         """The next mark after a time [s], or the last one before it; None where there's none."""
         index = bisect_left(self._times, t - 1e-6) - 1 if back else bisect_right(self._times, t + 1e-6)
-        return self._marks[index] if 0 <= index < len(self._marks) else None
+        return self.marks[index] if 0 <= index < len(self.marks) else None
 
 
 def falsified(before: AnyTimeline, after: AnyTimeline, at: float) -> tuple[float, float] | None:
@@ -206,11 +202,14 @@ def _happened(event: RunEvent) -> Iterator[Mark]:
         yield Mark(event.t, kind, event.text)
 
 
-def _told(entry: CommandRecord | Anchor, prismatic: Collection[int]) -> Iterator[Mark]:
+def _told(entry: Deed, prismatic: Collection[int]) -> Iterator[Mark]:
     """The mark of a command, or of what put the virtual robot elsewhere."""
     if isinstance(entry, Anchor):
         text = correction_text(entry.end, np.asarray(entry.error), entry.reason, prismatic)
         yield Mark(entry.at, MarkKind.CORRECTED, text, (entry.at, entry.end))
+    elif isinstance(entry, Placement):
+        if not entry.along:
+            yield Mark(entry.at, MarkKind.CORRECTED, "the virtual robot was put where the real one stands")
     elif entry.receipt is not None and not _usual(entry):
         receipt = entry.receipt
         start, end = receipt.execute_at, receipt.end

@@ -72,7 +72,7 @@ class Sink:
         except OSError as error:
             raise RecordingError(str(path), os.strerror(error.errno or 0)) from error
 
-    def write(self, data: bytes) -> int:
+    def write(self, data: bytes) -> None:
         """Write everything.
 
         Raises:
@@ -93,14 +93,6 @@ class Sink:
                 raise RecordingError(self.where, f"it takes no more after {self.size} bytes")
             self.size += taken
             rest = rest[taken:]
-        return len(data)
-
-    def tell(self) -> int:
-        """Bytes so far."""
-        return self.size
-
-    def flush(self) -> None:
-        """Nothing is held back."""
 
     def close(self) -> None:
         """Close the file.

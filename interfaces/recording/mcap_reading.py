@@ -362,7 +362,9 @@ class Blocks:
         self._newest = 0
         self._bad: set[int] = set()
         self._torn = 0
-        self._marred = self._ended = False
+        self._marred = False
+        self.complete = False
+        """Whether the file was closed in order: it has an index, or the message with which a recording ends."""
         self._tail = self._expected = len(MAGIC)
         self._window = (0, b"")
         self._numbers = dict(enumerate(range(1, len(CHANNELS) + 1), 1))
@@ -377,15 +379,6 @@ class Blocks:
 
     def __len__(self) -> int:
         return len(self._places)
-
-    @property
-    def complete(self) -> bool:
-        """Whether the file was closed in order."""
-        return self._ended
-
-    def ended(self) -> None:
-        """Take note that the message was found with which a recording ends."""
-        self._ended = True
 
     def span(self, index: int) -> tuple[int, int]:
         """Earliest and latest log time of a block [ns]."""
@@ -424,7 +417,7 @@ class Blocks:
         ends = self._places.ends
         until = max((end for index, end in enumerate(ends) if index not in self._bad), default=0)
         return Damage(
-            cut=not self._ended,
+            cut=not self.complete,
             until=until * 1e-9,
             blocks=len(self._bad) + sum(gap.blocks for gap in self._gaps) + self._torn,
             spans=tuple((first * 1e-9, last * 1e-9) for first, last in spans),
@@ -434,7 +427,7 @@ class Blocks:
     def lost(self, number: int) -> list[tuple[int, int]]:
         """Spans of log time in which messages of a channel may be missing [ns]; past the end of a cut file too."""
         found = self._spans(number)
-        if not self._ended:
+        if not self.complete:
             found.append((self._newest, FOREVER))
         return found
 
@@ -491,7 +484,7 @@ class Blocks:
 
     def _take(self, summary: Summary) -> None:
         """The blocks that an index names; a small file is checked at once."""
-        self._ended = True
+        self.complete = True
         self._count(sum(summary.places.sizes))
         self._numbers = {number: NUMBERS[topic] for number, topic in summary.topics.items() if topic in NUMBERS}
         self._places = summary.places

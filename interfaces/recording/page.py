@@ -5,14 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import math
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import replace
-from functools import reduce
-from operator import or_
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import msgspec
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
@@ -20,7 +19,7 @@ from interfaces.clients.playhead import Mode
 from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
 from interfaces.recording.recording import shows
-from interfaces.recording.stages import stage_of
+from interfaces.recording.stages import Stage
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, Viewers, files
 from vrs.clock import Clock
@@ -51,56 +50,19 @@ def page_files() -> list[BaseRoute]:
     return files("replay", "interfaces.recording", ("seekbar.js", "controls.js"))
 
 
-class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do"):
-    """What a page asks for."""
+class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a page asks for; what it doesn't say is no number, and refused where it's needed."""
 
-
-class _PlayWish(_Wish, frozen=True, tag="play"):
+    do: Literal["play", "pause", "toggle", "rate", "step", "seek", "skip", "loop", "unloop", "live", "mark"]
     rate: float | None = None
-
-
-class _PauseWish(_Wish, frozen=True, tag="pause"):
-    pass
-
-
-class _ToggleWish(_Wish, frozen=True, tag="toggle"):
-    pass
-
-
-class _RateWish(_Wish, frozen=True, tag="rate"):
-    rate: float
-
-
-class _StepWish(_Wish, frozen=True, tag="step"):
-    by: float
-
-
-class _SeekWish(_Wish, frozen=True, tag="seek"):
-    t: float
-
-
-class _SkipWish(_Wish, frozen=True, tag="skip"):
-    by: float
-
-
-class _LoopWish(_Wish, frozen=True, tag="loop"):
-    start: float
-    end: float
-
-
-class _UnloopWish(_Wish, frozen=True, tag="unloop"):
-    pass
-
-
-class _LiveWish(_Wish, frozen=True, tag="live"):
-    pass
-
-
-class _ToMarkWish(_Wish, frozen=True, tag="mark"):
+    by: float = math.nan
+    t: float = math.nan
+    start: float = math.nan
+    end: float = math.nan
     back: bool = False
 
 
-_decoder: msgspec.json.Decoder[_Wish] = msgspec.json.Decoder(reduce(or_, _Wish.__subclasses__()))
+_decoder = msgspec.json.Decoder(_Wish)
 
 
 class ReplayPage:
@@ -111,7 +73,6 @@ class ReplayPage:
         playback: Playback,
         clock: Clock,
         *,
-        admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         first: Callable[[float], None] | None = None,
         board: Newest | None = None,
@@ -122,14 +83,13 @@ class ReplayPage:
         Args:
             playback: What is played.
             clock: The user's.
-            admit: See `Viewers`.
             authorize: See `Viewers`.
             first: Called with the user's time [s] when the first page is there.
             board: What pages look at already; one of its own unless given.
             show: Time between two frames [s].
         """
         self.playback, self.clock, self._first, self._show = playback, clock, first, show
-        self._stages = tuple(stage_of(track.recording) for track in playback.tracks)
+        self._stages = tuple(Stage(track.recording) for track in playback.tracks)
         self.scenes = tuple(stage.scene for stage in self._stages)
         self.board = Newest(BEGIN) if board is None else board
         """What pages are told: JSON by key."""
@@ -137,10 +97,10 @@ class ReplayPage:
         self._marked = float("-inf")
         self._versions: list[tuple[int, tuple[float, float]] | None] = [None] * len(playback.tracks)
         self._put("recordings", {"kind": "recordings", "items": _recordings(playback)})
-        self.viewers = tuple(Viewers(scene, admit, authorize) for scene in self.scenes)
+        self.viewers = tuple(Viewers(scene, authorize) for scene in self.scenes)
         """Of each scene."""
-        board_viewers = Viewers(self.board, admit, authorize, hear=self.hear, most_heard=MOST_HEARD)
-        self._routes: list[BaseRoute] = [
+        board_viewers = Viewers(self.board, authorize, hear=self.hear, most_heard=MOST_HEARD)
+        self.routes: list[BaseRoute] = [
             Route("/", _to_page),
             *page_files(),
             WebSocketRoute("/replay/board", board_viewers.serve),
@@ -149,11 +109,7 @@ class ReplayPage:
                 for index, viewers in enumerate(self.viewers)
             ),
         ]
-
-    @property
-    def routes(self) -> list[BaseRoute]:
         """What it answers."""
-        return self._routes
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[ReplayPage]:
@@ -218,31 +174,31 @@ class ReplayPage:
 
     def _do(self, wish: _Wish, now: float) -> None:
         playback = self.playback
-        match wish:
-            case _PlayWish(rate):
-                playback.play(now=now, rate=rate)
-            case _PauseWish():
+        match wish.do:
+            case "play":
+                playback.play(now=now, rate=wish.rate)
+            case "pause":
                 playback.pause(now=now)
-            case _ToggleWish():
+            case "toggle":
                 (playback.play if playback.mode is Mode.PAUSED else playback.pause)(now=now)
-            case _RateWish(rate):
-                playback.set_rate(rate, now=now)
+            case "rate":
+                playback.set_rate(math.nan if wish.rate is None else wish.rate, now=now)
                 if playback.mode is not Mode.PAUSED:
                     playback.play(now=now)
-            case _StepWish(by):
-                playback.step(by, now=now)
-            case _SeekWish(t):
-                playback.seek(t, now=now)
-            case _SkipWish(by):
-                playback.seek(playback.place(now=now) + by, now=now)
-            case _LoopWish(start, end):
-                playback.set_loop(start, end, now=now)
-            case _UnloopWish():
+            case "step":
+                playback.step(wish.by, now=now)
+            case "seek":
+                playback.seek(wish.t, now=now)
+            case "skip":
+                playback.seek(playback.place(now=now) + wish.by, now=now)
+            case "loop":
+                playback.set_loop(wish.start, wish.end, now=now)
+            case "unloop":
                 playback.clear_loop(now=now)
-            case _LiveWish():
+            case "live":
                 playback.go_live(now=now)
-            case _ToMarkWish(back):
-                playback.seek_mark(back=back, now=now)
+            case "mark":
+                playback.seek_mark(back=wish.back, now=now)
         self._told = float("-inf")
 
 

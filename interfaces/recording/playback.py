@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 import numpy as np
-from typing_extensions import override
 
 from interfaces.clients.playhead import LiveEdge, Mode, PlayHead
-from interfaces.recording.figures import Follower, Pursuit
+from interfaces.recording.figures import Pursuit
+from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader
-from interfaces.recording.recording import ARM, Recording, check_alike
+from interfaces.recording.recording import Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
 from vrs.commands import finite
 from vrs.errors import FormatError, InvalidValueError
@@ -83,19 +83,18 @@ class PlaybackMoment:
     """One for each recording."""
 
 
-class _AtEqualTime(Follower):
-    """Compares with the virtual robot at equal timeline time."""
+class _AtEqualTime:
+    """How a real robot follows a virtual one: compared at equal timeline time."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
 
-    @override
-    def play(self, t: float) -> float | None:
+    def play(self, t: float) -> float:
+        """The time of the timeline at which the real robot is at a time [s]."""
         return float(self._recording.play(t))
 
-    @override
-    def error(self, t: float, q_real: Array, play: float) -> float | None:
-        """See `Follower`: the largest difference of a joint that turns [rad]; where none does, of any [m]."""
+    def error(self, _t: float, q_real: Array, play: float) -> float | None:
+        """The largest difference of a joint that turns [rad]; where none does, of any [m]."""
         q, prismatic = self._recording.virtual(play), self._recording.prismatic
         some = slice(None) if len(prismatic) in (0, len(q)) else [j for j in range(len(q)) if j not in prismatic]
         return float(np.abs(q_real - q)[some].max()) if np.isfinite(q).all() else None
@@ -108,7 +107,7 @@ class PlaybackTrack:
         self.recording, self.marks = recording, MarkReader(recording)
         self.shift = shift
         """The play-back's time less the recording's own [s]."""
-        self._follower: Follower = _AtEqualTime(recording) if recording.kind is ARM else Pursuit(recording)
+        self._follower = _AtEqualTime(recording) if recording.kind is ARM else Pursuit(recording)
         self.problem = ""
         """What of the file makes no sense, the first line of it; empty where all does."""
         self._more = True
@@ -192,14 +191,10 @@ class Playback:
         self.growing = False
         """Whether a file is being written."""
         self._grown = self._due = -math.inf
-        self._span = self._spanned()
-        self.head = PlayHead(self._live, lambda: self._span)
-        self.head.pause(now=0.0)
-
-    @property
-    def span(self) -> tuple[float, float]:
+        self.span = self._spanned()
         """From when to when there's something [s]."""
-        return self._span
+        self.head = PlayHead(self._live, lambda: self.span)
+        self.head.pause(now=0.0)
 
     @property
     def mode(self) -> Mode:
@@ -214,7 +209,7 @@ class Playback:
     def place(self, *, now: float) -> float:
         """The time that is shown [s]."""
         place = self.head.position(now)
-        start, end = self._span
+        start, end = self.span
         return start if place is None else min(max(place, start), end)
 
     def play(self, *, now: float, rate: float | None = None) -> None:
@@ -228,7 +223,7 @@ class Playback:
             InvalidValueError: If rate is out of range, or 0.
         """
         rate = checked_rate(self.head.rate if rate is None else rate)
-        place, (start, end) = self.place(now=now), self._span
+        place, (start, end) = self.place(now=now), self.span
         if rate > 0 and place >= end and not self.growing:
             self.head.seek(start, now=now)
         elif rate < 0 and place <= start:
@@ -254,7 +249,7 @@ class Playback:
 
     def seek(self, t: float, *, now: float) -> None:
         """Go to a time [s], the nearest there is; what stood stands there, all else plays on."""
-        start, end = self._span
+        start, end = self.span
         self.head.seek(min(max(finite("t", t, "finite seconds"), start), end), now=now)
 
     def seek_mark(self, *, back: bool, now: float) -> Mark | None:
@@ -309,7 +304,7 @@ class Playback:
             track.look()
 
     def _at_an_end(self, place: float) -> bool:
-        (start, end), loop, rate = self._span, self.head.loop, self.head.rate
+        (start, end), loop, rate = self.span, self.head.loop, self.head.rate
         if rate > 0:
             return place >= end and not self.growing and (loop is None or loop[1] < end)
         return place <= start and (loop is None or loop[0] > start)
@@ -330,8 +325,8 @@ class Playback:
         grown = [track.poll() for track in self.tracks]
         if any(grown):
             shown = self.place(now=now)
-            self._span = self._spanned()
-            newest = self._span[1] - LAG
+            self.span = self._spanned()
+            newest = self.span[1] - LAG
             if not self.growing:
                 # What was shown of it already isn't taken back.
                 self._edge, newest = LiveEdge(), max(newest, shown)

@@ -1,16 +1,16 @@
-"""A recording that's open for reading, and the kinds of robots that recordings are of."""
+"""A recording that's open for reading."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,15 +25,17 @@ from interfaces.messages.recording import (
     End,
     GivenEntry,
     LinkEntry,
+    Placement,
     ReceiptEntry,
     RoomEntry,
     RunEvent,
 )
 from interfaces.recording.errors import Damage
-from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit
+from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit, sampled
+from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
-from interfaces.recording.track import REAL, REAL_POSTURE, VIRTUAL, VIRTUAL_POSTURE, Log, SampleTrack, Tracks
-from robots.robot import Robot, load, names
+from interfaces.recording.track import Log, SampleTrack, Tracks
+from robots.robot import BARE, Robot, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
@@ -41,30 +43,8 @@ from vrs.segment import times
 
 POSTURE = 3
 """Numbers of a posture."""
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingKind:
-    """A kind of robot, as recordings know it."""
-
-    name: str
-    """For people, with its article."""
-    word: str
-    """For programs."""
-    virtual: str
-    """Topic of the virtual robot's samples."""
-    real: str
-    """Topic of the real robot's."""
-    unit: str
-    """Of how far the real robot is from the virtual one: `rad` or `m`."""
-    state: str
-    """What an engine calls where it begins."""
-
-
-ARM: Final = RecordingKind("an arm", "arm", VIRTUAL, REAL, "rad", "q")
-"""Joints, and polynomials on its timeline."""
-MOBILE: Final = RecordingKind("a mobile robot", "mobile", VIRTUAL_POSTURE, REAL_POSTURE, "m", "posture")
-"""Postures, and arcs on its timeline."""
+Deed: TypeAlias = CommandRecord | Anchor | Placement
+"""What the operator's engine was told, or what put the virtual robot elsewhere."""
 
 
 def shows(begin: Begin) -> list[str]:
@@ -100,7 +80,8 @@ class Recording:
             self._blocks = Blocks(self._source)
             self.logs = {topic: Log(self._blocks, topic, str(path)) for topic in NUMBERS}
             """Entries by channel."""
-            self._end: End | None = None
+            self.end: End | None = None
+            """What it was closed with; None where it's cut."""
             begin = self._session()
             if begin is None:
                 raise FormatError(str(path), "isn't a recording, or the block that it begins with is destroyed")
@@ -131,11 +112,11 @@ class Recording:
     def _session(self) -> Begin | None:
         """Whether the recording has ended; the first beginning that's readable."""
         held = self._blocks.having(NUMBERS["/session"])
-        if held and not self._end:
+        if held and not self.end:
             ends = [entry for entry in self.logs["/session"].of(held[-1]) if isinstance(entry, End)]
             if ends:
-                self._end = ends[-1]
-                self._blocks.ended()
+                self.end = ends[-1]
+                self._blocks.complete = True
         for index in held:
             for entry in self.logs["/session"].of(index):
                 if isinstance(entry, Begin):
@@ -154,11 +135,6 @@ class Recording:
         if grown:
             self._session()
         return grown
-
-    @property
-    def end(self) -> End | None:
-        """What it was closed with; None where it's cut."""
-        return self._end
 
     @property
     def damage(self) -> Damage:
@@ -183,9 +159,8 @@ class Recording:
             FormatError: If it's none that is known here, or has other joints.
         """
         begin = self.session
-        # Mobile robots of one family have its name, and a body of their own.
-        own = begin.drive is not None and begin.drive.body in names()
-        name = begin.drive.body if own and begin.drive is not None else begin.robot
+        # Mobile robots of one family have its name as their model's, and a name of their own.
+        name = begin.robot if begin.drive is None or begin.drive.body == BARE else begin.drive.body
         robot = self._robot
         if (robot is None or robot.name != name) and name in names():
             robot = load(name)
@@ -235,9 +210,9 @@ class Recording:
         return start, last
 
     @property
-    def commands(self) -> tuple[CommandRecord | Anchor, ...]:
+    def commands(self) -> tuple[Deed, ...]:
         """What the operator's engine was told, in order; numbers are missing where blocks are."""
-        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor))
+        return tuple(entry for entry in self._commands() if isinstance(entry, CommandRecord | Anchor | Placement))
 
     def receipts(self, site: Literal["virtual", "real"]) -> tuple[Receipt, ...]:
         """The newest truth about each command at a site, by command id."""
@@ -268,7 +243,7 @@ class Recording:
         except InvalidValueError as error:
             raise FormatError(str(self.path), f"a command from before it: {error}") from None
 
-    def _commands(self) -> list[CommandRecord | Anchor | ReceiptEntry | CommandPacket | GivenEntry]:
+    def _commands(self) -> list[Deed | ReceiptEntry | CommandPacket | GivenEntry]:
         return self.logs["/commands"].entries()
 
     @property
@@ -312,6 +287,16 @@ class Recording:
             raise FormatError(str(self.path), "the block with the timeline is destroyed")
         return edits
 
+    @property
+    def drives(self) -> Sequence[AnyTimeline]:
+        """The newest timeline of each drive, by their starts; of an arm there's one. Not to be changed.
+
+        Raises:
+            FormatError: If none is known.
+        """
+        self._known()
+        return self._chain.drives
+
     def timeline_at(self, t: float) -> AnyTimeline:
         """The timeline as it was known at a user time [s]: what came later isn't in it.
 
@@ -338,7 +323,7 @@ class Recording:
         return math.inf
 
     def virtual(self, t: ArrayLike) -> Array:
-        """Joints of the virtual robot, or its posture, computed from the newest timeline.
+        """Joints of the virtual robot, or its posture, computed from the newest timeline of each drive.
 
         Args:
             t: User time [s], scalar or (k,).
@@ -350,7 +335,7 @@ class Recording:
             NonFiniteTimeError: If t holds NaN or infinity.
         """
         moments = times(t)
-        found: Array = self.timeline.sample(moments).copy()
+        found: Array = sampled(self.drives, moments).copy()
         found[np.asarray(moments) > self.certain + 1e-9] = np.nan
         return found
 
@@ -389,7 +374,7 @@ class Recording:
     def room(self) -> RoomEntry | None:
         """Where a mobile robot drove; None if that isn't there."""
         rooms = [entry for entry in self.logs["/session"].entries() if isinstance(entry, RoomEntry)]
-        return rooms[0] if rooms else None
+        return rooms[-1] if rooms else None
 
     @property
     def learned(self) -> tuple[CellsEntry, ...]:

@@ -10,15 +10,15 @@ import msgspec
 import numpy as np
 
 from interfaces.messages.fields import plain
-from interfaces.messages.recording import Anchor, CommandRecord, Late
-from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries
-from interfaces.recording.recording import MOBILE, Recording
+from interfaces.messages.recording import Anchor, CommandRecord, Late, Placement
+from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries, placed
+from interfaces.recording.kinds import MOBILE
+from interfaces.recording.recording import Deed, Recording
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import FormatError, VrsError
 from vrs.ledger import Receipt, Standing, Status
-from vrs.timeline import Timeline
 
 
 def begun(recording: Recording) -> tuple[Engine, ManualClock]:
@@ -32,14 +32,19 @@ def begun(recording: Recording) -> tuple[Engine, ManualClock]:
         raise FormatError(where, "it begins in the middle of a session, which isn't known of mobile robots")
     try:
         clock, lateness = ManualClock(begin.t), Lateness(begin.lateness)
-        if begin.late is None:
+        newest = 0 if begin.drive is None else begin.drive.newest
+        if begin.late is None and not newest:
             start: dict[str, Any] = {recording.kind.state: begin.q}
             return Engine(model, **start, clock=clock, lateness=lateness), clock
         edits = recording.edits
-        if not edits or edits[0].number or not isinstance(edits[0].timeline, Timeline):
+        if not edits or edits[0].number:
             raise FormatError(where, "the timeline that it begins with is destroyed")
-        engine = Engine(model, timeline=edits[0].timeline, clock=clock, lateness=lateness)
-        engine.take_up(_stand(recording, begin.late, engine))
+        begun_with: Any = edits[0].timeline
+        engine = Engine(model, timeline=begun_with, clock=clock, lateness=lateness)
+        if begin.late is None:
+            engine.count_from(newest)
+        else:
+            engine.take_up(_stand(recording, begin.late, engine))
     except FormatError:
         raise
     except ValueError as error:
@@ -81,13 +86,15 @@ class Rerun:
     """What became of recorded commands on a fresh engine."""
 
     def __init__(self, engine: Engine, clock: ManualClock, changes: Sequence[AnyEdit], late: Late | None) -> None:
-        self._engine, self._clock, self._late = engine, clock, late
+        self._clock, self._late = clock, late
+        self._engines = [engine]
+        """Of each drive; of an arm there's one."""
         self._recorded: dict[int, list[AnyEdit]] = {}
         for change in changes:
             self._recorded.setdefault(change.edit, []).append(change)
         first = self._recorded.pop(0, [])
         self.commands = 0
-        """Commands and corrections that were run again."""
+        """Commands, corrections and placements that were run again."""
         self.versions = 0
         """Timelines that were compared."""
         self.difference = ""
@@ -108,25 +115,32 @@ class Rerun:
     @property
     def timeline(self) -> AnyTimeline:
         """What they made."""
-        return self._engine.timeline
+        return self._engines[-1].timeline
+
+    @property
+    def drives(self) -> tuple[AnyTimeline, ...]:
+        """The timeline that they made of each drive; of an arm there's one."""
+        return tuple(engine.timeline for engine in self._engines)
 
     @property
     def receipts(self) -> tuple[Receipt, ...]:
         """The newest truth about each command."""
-        return self._engine.receipts
+        return tuple(receipt for engine in self._engines for receipt in engine.receipts)
 
-    def run(self, entry: CommandRecord | Anchor) -> None:
+    def run(self, entry: Deed) -> None:
         """Run one entry, and compare what it makes."""
         self.commands += 1
-        engine, before = self._engine, self._engine.timeline
+        before = self._engines[-1].timeline
         try:
             self._clock.set(max(entry.at, self._clock.now()))
-            receipt = None
+            if isinstance(entry, Placement):
+                self._engines.append(placed(self._engines[-1], entry.posture, self._clock))
+            engine, receipt, command_id, problem = self._engines[-1], None, None, ""
             if isinstance(entry, Anchor):
                 made = engine.anchor(entry.truth)
                 same = made.end == entry.end and np.array_equal(made.error, entry.error)
-                command_id, problem = None, "" if same else "joins the real robot's plan otherwise"
-            else:
+                problem = "" if same else "joins the real robot's plan otherwise"
+            elif isinstance(entry, CommandRecord):
                 receipt = self._carry_out(entry)
                 command_id = None if receipt is None else receipt.command_id
                 problem = _unlike(receipt, entry.receipt)
@@ -143,10 +157,10 @@ class Rerun:
             after = engine.timeline
             self._compare(edit_entries(before, after, self._edit, entry.at, command_id), entry)
 
-    def _goes_back(self, entry: CommandRecord | Anchor, made: Receipt | None) -> bool:
+    def _goes_back(self, entry: Deed, made: Receipt | None) -> bool:
         """Whether a command needs what only an engine from before the recording knows."""
         late = self._late
-        if late is None or isinstance(entry, Anchor):
+        if late is None or not isinstance(entry, CommandRecord):
             return False
         command, answer = entry.command, entry.receipt
         undone = command is None and made is None and answer is not None and answer.command_id <= late.newest
@@ -163,13 +177,13 @@ class Rerun:
     def _carry_out(self, entry: CommandRecord) -> Receipt | None:
         command = entry.command
         if entry.refused and command is not None:
-            return self._engine.refuse(command, "" if entry.receipt is None else entry.receipt.reason)
+            return self._engines[-1].refuse(command, "" if entry.receipt is None else entry.receipt.reason)
         if command is None:
-            return self._engine.undo()
-        answer: object = self._engine.execute(command)  # type: ignore[arg-type]
+            return self._engines[-1].undo()
+        answer: object = self._engines[-1].execute(command)  # type: ignore[arg-type]
         return answer if isinstance(answer, Receipt) else None
 
-    def _compare(self, made: tuple[AnyEdit, ...], entry: CommandRecord | Anchor) -> None:
+    def _compare(self, made: tuple[AnyEdit, ...], entry: Deed) -> None:
         recorded = self._recorded.pop(self._edit, None)
         if recorded is None:
             self._unseen.append(self._edit)
@@ -191,9 +205,10 @@ class Rerun:
             self.missing = f"what made edit {min(self._recorded)} isn't in the recording"
 
 
-def _named(entry: CommandRecord | Anchor) -> str:
-    if isinstance(entry, Anchor):
-        return f"the correction at {entry.at:.6f} s"
+def _named(entry: Deed) -> str:
+    if not isinstance(entry, CommandRecord):
+        what = "correction" if isinstance(entry, Anchor) else "placement"
+        return f"the {what} at {entry.at:.6f} s"
     if entry.command is None:
         return f"the undo at {entry.at:.6f} s"
     given = "" if entry.receipt is None else f" {entry.receipt.command_id}"

@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Sequence
 from math import isnan
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import msgspec
 import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
-from interfaces.messages import recording as d
-from interfaces.messages.commands import portable
 from interfaces.messages.fields import cut, text
 from interfaces.messages.recording import (
     COLLISION,
     Begin,
     CommandPacket,
-    CommandRecord,
     Direction,
+    DriveFacts,
+    EditEntry,
     End,
+    EstimatedPosture,
+    HistoryEntry,
     LinkEntry,
+    MeasuredPosture,
+    RealPosture,
     RealSample,
     RunEvent,
     grid_facts,
@@ -35,58 +35,86 @@ from interfaces.messages.recording import (
 from interfaces.recording.capture import Capture, link_entry
 from interfaces.recording.channels import Message
 from interfaces.recording.errors import RecordingError
-from interfaces.recording.history import edit_entries, whole_entries
-from interfaces.recording.poses import (
-    LINK_RATE,
-    POSE_RATE,
-    WORLD,
-    Paced,
-    link_transforms,
-    real_pose,
-    robot_frames,
-    virtual_pose,
-)
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose, virtual_pose
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.runs.summary import CAUSES, Attribution, Measures, OffsetOutcome
 from interfaces.runs.twin_run import Turn, TwinRun
 from interfaces.system import software
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.rooms import EMPTY
-from robots.ipr.robot import MobileRobot
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
+from robots.robot import BARE
 from vrs.commands import Lateness
 from vrs.errors import FormatError
 from vrs.mobile import Grid
 from vrs.model import Array
 
 
-class RunRecorder:
-    """Writes one run into a file. A disk that takes no more ends the recording, not the run."""
+class _FileRecorder:
+    """Writes a run into a file. A disk that takes no more ends the recording, not the run."""
 
     def __init__(self, path: Path) -> None:
-        """Record into a file, which is made anew when the run begins."""
+        """Record into a file, which is made anew."""
         self.path = path
         self.problem = ""
         """Why nothing more is written; empty while all is."""
         self._writer: RecordingWriter | None = None
+
+    def _open(self, begin: Begin) -> None:
+        """Make the file."""
+        try:
+            self._writer = RecordingWriter(self.path, begin)
+        except RecordingError as error:
+            self.problem = str(error)
+
+    def _put(self, message: Message, *, t: float) -> None:
+        """Write a message, if that can be done."""
+        writer = self._writer
+        if writer is not None:
+            self._try(lambda: writer.write(message, t=t))
+
+    def _close(self, end: End) -> None:
+        """Close the file in order, if that can be done."""
+        writer = self._writer
+        if writer is not None:
+            self._try(lambda: writer.finish(end))
+        self._writer = None
+
+    def _try(self, do: Callable[[], None]) -> None:
+        """Do something with the file; a disk that doesn't take it ends the recording."""
+        try:
+            do()
+        except RecordingError as error:
+            self.problem = str(error)
+            writer, self._writer = self._writer, None
+            if writer is not None:
+                writer.give_up()
+
+
+class RunRecorder(_FileRecorder):
+    """Writes one run of an arm's twins into a file, while it goes on."""
+
+    def __init__(self, path: Path) -> None:
+        """Record into a file, which is made anew when the run begins."""
+        super().__init__(path)
         self._capture: Capture | None = None
         self._real, self._links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._events: set[RunEvent] = set()
         self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
 
-    def begin(self, begin: Begin, operator: OperatorSite) -> None:
+    def begin(self, begin: Begin, operator: OperatorSite[VirtualArm]) -> None:
         """Begin the file."""
-        self._capture = Capture(operator, operator.engine.model, now=0.0, step=begin.step, every=True)
-        try:
-            self._writer = RecordingWriter(self.path, begin)
-        except RecordingError as error:
-            self._fail(error)
-        else:
-            self._capture.put = self._put
+        self._capture = capture = Capture(operator.robot.engine, now=0.0, step=begin.step, every=True)
+        operator.listener = capture
+        self._open(begin)
+        for message in capture.first():
+            capture.add(0.0, message)
+        capture.put = self._put
 
     def turn(self, turn: Turn) -> None:
         """Write down what has happened."""
@@ -103,18 +131,12 @@ class RunRecorder:
         rows = zip(t.tolist(), turn.play.tolist(), turn.q_real.tolist(), turn.q_reference.tolist(), strict=True)
         for now, play, q, reference in rows:
             capture.add(now, RealSample(now, play, q, reference))
-        capture.show(self._real, t, turn.q_real, capture.model.forward, real_pose)
-        self._tell_links(capture, t, turn.q_real, *capture.advance(now=turn.now))
-        capture.write_out()
-
-    def _tell_links(self, capture: Capture, t: Array, q_real: Array, t_virtual: Array, q_virtual: Array) -> None:
+        capture.show(self._real, t, turn.q_real, real_pose)
+        t_virtual, q_virtual = capture.sample(now=turn.now)
         # Both robots have samples at the same times, but for the last ones of a run.
         k = min(len(t), len(t_virtual))
-        rows = self._links.chosen(t[:k], np.hstack([q_virtual[:k], q_real[:k]]))
-        if rows:
-            virtual, real = capture.model.links(q_virtual[rows]), capture.model.links(q_real[rows])
-            for row, X, Y in zip(rows, virtual, real, strict=True):
-                capture.add(t[row], link_transforms(t[row], (("virtual", X[1:]), ("real", Y[1:]))))
+        capture.show_links(self._links, t[:k], virtual=q_virtual[:k], real=turn.q_real[:k])
+        capture.write_out()
 
     def _tell_event(self, event: RunEvent, t: float) -> None:
         if event not in self._events and self._capture is not None:
@@ -145,31 +167,7 @@ class RunRecorder:
 
     def finish(self, attributions: Sequence[Attribution] = (), offsets: Sequence[OffsetOutcome] = ()) -> None:
         """Close the file, with what its summary says beside what can be computed from it."""
-        writer, self._writer = self._writer, None
-        if writer is None:
-            return
-        extras = msgspec.to_builtins(_Extras(tuple(attributions), tuple(offsets)))
-        self._try(lambda: writer.finish(End(self._end, extras)))
-
-    def _put(self, message: Message, *, t: float) -> None:
-        writer = self._writer
-        if writer is not None:
-            self._try(lambda: writer.write(message, t=t))
-
-    def _try(self, do: Callable[[], None]) -> None:
-        """Do something with the file; a disk that doesn't take it ends the recording."""
-        try:
-            do()
-        except RecordingError as error:
-            self._fail(error)
-
-    def _fail(self, error: RecordingError) -> None:
-        self.problem = str(error)
-        writer, self._writer = self._writer, None
-        if self._capture is not None:
-            self._capture.put = None
-        if writer is not None:
-            writer.give_up()
+        self._close(End(self._end, msgspec.to_builtins(_Extras(tuple(attributions), tuple(offsets)))))
 
 
 class _Extras(msgspec.Struct, frozen=True):
@@ -199,74 +197,66 @@ def extras_of(extras: dict[str, Any], where: str) -> tuple[tuple[Attribution, ..
     return found.attributions, found.offsets
 
 
-Timed: TypeAlias = tuple[float, Message]
-"""A message and its time [s]."""
 LONGEST_WORD = 200
 """Characters of an operator's name that are kept."""
 
 
-class DriveRecorder(Witness):
+class DriveRecorder(_FileRecorder, Witness):
     """A `Witness` that writes a run into a file when it's over."""
-
-    def __init__(self, path: Path) -> None:
-        """Record into a file, which is made anew when the run is over."""
-        self.path = path
-        self.problem = ""
-        """Why it wasn't written; empty where it was."""
-        self._commands: list[Timed] = []
-        """Commands, and the edits that they made."""
-        self._number = 0
-        self._edited: list[float] = []
-        """When the timeline was edited [s]."""
-        self._sent: dict[str, list[tuple[float, int]]] = {"forward": [], "backward": []}
-        self._settled: dict[str, list[PacketRecord]] = {"forward": [], "backward": []}
 
     @override
     def begun(
         self, case: DriveCase, start: Posture, body: MobileRobot, site: ArchitectureOperatorSite, link: DriveLink
     ) -> None:
-        self._case, self._start, self._site = case, start, site
+        self._case, self._start = case, start
         self._place = () if body.room is EMPTY else (room_entry(body.room),)
         self._grid: Grid | None = None if site.surroundings is None else grid_of(body.room, start)
-        self._first = self._timeline = site.engine.timeline
-        site.listener = self._commanded
-        for direction, lane in (("forward", link.forward), ("backward", link.backward)):
-            lane.log.told = partial(self._settle, direction)
+        self._noted: list[tuple[float, Message]] = []
+        self._capture = Capture(site.engine, now=0.0, step=CONTROL, every=True)
+        self._capture.put = self._note
+        for message in self._capture.first():
+            self._note(message, t=0.0)
+        site.listener = self._capture.commanded
+        self._sent: dict[Direction, list[tuple[float, int]]] = {"forward": [], "backward": []}
+        self._settled: dict[Direction, list[PacketRecord]] = {"forward": [], "backward": []}
+        link.forward.log.told = self._settled["forward"].append
+        link.backward.log.told = self._settled["backward"].append
+
+    def _note(self, message: Message, *, t: float) -> None:
+        self._noted.append((t, message))
 
     @override
-    def sent(self, direction: str, now: float, size: int) -> None:
+    def sent(self, direction: Direction, now: float, size: int) -> None:
         self._sent[direction].append((now, size))
 
     def finish(self, drive: DriveRun) -> None:
         """Write the run down. A disk that doesn't take it is a `problem`, and ends nothing else."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            writer = RecordingWriter(self.path, self._begin())
-        except (RecordingError, OSError) as error:
+        except OSError as error:
             self.problem = str(error)
             return
-        try:
-            for t, message in self._messages(drive):
-                writer.write(message, t=t)
-            writer.finish(End(float(drive.t[-1])))
-        except RecordingError as error:
-            self.problem = str(error)
-            writer.give_up()
-
-    def _commanded(self, deed: CommandRecord) -> None:
-        before, self._timeline = self._timeline, self._site.engine.timeline
-        receipt = None if deed.receipt is None else portable(deed.receipt)
-        self._number += 1
-        self._commands.append((deed.at, replace(deed, number=self._number, receipt=receipt)))
-        if self._timeline is not before:
-            self._edited.append(deed.at)
-            command_id = None if receipt is None else receipt.command_id
-            entries = edit_entries(before, self._timeline, len(self._edited), deed.at, command_id)
-            self._commands += [(deed.at, entry) for entry in entries]
-
-    def _settle(self, direction: str, record: PacketRecord) -> None:
-        if not record.copy:
-            self._settled[direction].append(record)
+        end, capture = float(drive.t[-1]), self._capture
+        capture.tell_happened()
+        capture.write_out()
+        self._add_samples(drive)
+        self._add_poses(drive)
+        self._add_packets("forward", end)
+        self._add_packets("backward", end)
+        for t, cells in drive.learned:
+            capture.learn(t, cells)
+        for touch in drive.touched:
+            capture.add(touch.time, RunEvent(touch.time, COLLISION, f"collision: {touch.thing}"))
+        capture.whole(end)
+        capture.write_out()
+        self._open(self._begin())
+        for entry in self._place:
+            self._put(entry, t=0.0)
+        for t, message in sorted(self._noted, key=itemgetter(0)):
+            self._put(message, t=t)
+        for entry in self._place:
+            self._put(entry, t=end)
+        self._close(End(end))
 
     def _begin(self) -> Begin:
         case = self._case
@@ -285,8 +275,8 @@ class DriveRecorder(Witness):
             q=list(self._start),
             lateness=str(Lateness.POSTPONE),
             software=software(),
-            drive=d.DriveFacts(
-                body=case.robot,  # type: ignore[arg-type]
+            drive=DriveFacts(
+                body=BARE if case.robot == BARE else case.real[0].name,
                 architecture=case.architecture,
                 transport=case.transport.value,
                 operator=text(case.operator)[:LONGEST_WORD],
@@ -297,82 +287,37 @@ class DriveRecorder(Witness):
             ),
         )
 
-    def _messages(self, drive: DriveRun) -> Iterator[Timed]:
-        """All of them, by time."""
-        end = float(drive.t[-1])
-        yield from ((0.0, entry) for entry in self._place)
-        yield from ((0.0, entry) for entry in whole_entries(self._first, 0, 0.0))
-        yield from heapq.merge(
-            self._commands,
-            self._samples(drive),
-            self._shown(drive),
-            self._packets("forward", end),
-            self._packets("backward", end),
-            self._learned(drive),
-            sorted(
-                ((c.time, RunEvent(c.time, COLLISION, f"collision: {c.thing}")) for c in drive.touched),
-                key=itemgetter(0),
-            ),
-            key=itemgetter(0),
-        )
-        yield from ((end, entry) for entry in whole_entries(self._timeline, len(self._edited), end))
-        yield from ((end, entry) for entry in self._place)
-
-    def _samples(self, drive: DriveRun) -> Iterator[Timed]:
-        edits = np.searchsorted(self._edited, drive.t, side="right").tolist()
+    def _add_samples(self, drive: DriveRun) -> None:
+        """Where both robots were, and were thought to be."""
+        capture = self._capture
+        edited = {m.edit: t for t, m in self._noted if isinstance(m, EditEntry | HistoryEntry) and m.edit}
+        edits = np.searchsorted(list(edited.values()), drive.t, side="right").tolist()
         columns = (drive.t, drive.virtual, drive.real, drive.measured, drive.estimated, drive.drives, drive.offset)
-        for row, (t, virtual, real, measured, estimated, (v, w), D) in enumerate(
-            zip(*(column.tolist() for column in columns), strict=True)
-        ):
-            x, y, theta = virtual
-            yield t, d.VirtualPosture(t, x, y, theta, edits[row])
-            yield t, d.RealPosture(t, *real, v=v, w=w, D=None if isnan(D) else D)
-            yield t, d.MeasuredPosture(t, *measured)
-            yield t, d.EstimatedPosture(t, *estimated)
+        rows = zip(*(column.tolist() for column in columns), edits, strict=True)
+        for t, virtual, real, measured, estimated, (v, w), D, edit in rows:
+            capture.add(t, capture.kind.sample(t, virtual, edit))
+            capture.add(t, RealPosture(t, *real, v=v, w=w, D=None if isnan(D) else D))
+            capture.add(t, MeasuredPosture(t, *measured))
+            capture.add(t, EstimatedPosture(t, *estimated))
 
-    def _shown(self, drive: DriveRun) -> Iterator[Timed]:
+    def _add_poses(self, drive: DriveRun) -> None:
         """Both robots for other readers, at a lower rate."""
-        poses, links = Paced(POSE_RATE), Paced(LINK_RATE)
-        both = np.hstack([drive.virtual, drive.real])
-        drawn = set(links.chosen(drive.t, both))
-        for row in sorted(drawn | set(poses.chosen(drive.t, both))):
-            t, X = float(drive.t[row]), np.stack([_pose(*q) for q in (drive.virtual[row], drive.real[row])])
-            yield t, virtual_pose(t, X[0], WORLD)
-            yield t, real_pose(t, X[1], WORLD)
-            if row in drawn:
-                yield t, robot_frames(t, WORLD, ("virtual", "real"), X)
+        capture = self._capture
+        rows = Paced(POSE_RATE).chosen(drive.t, np.hstack([drive.virtual, drive.real]))
+        t, robots = drive.t[rows].tolist(), {"virtual": drive.virtual[rows], "real": drive.real[rows]}
+        poses = (capture.kind.poses(capture.model, q) for q in robots.values())
+        shown = zip(t, *poses, capture.kind.frames(capture.model, t, robots), strict=True)
+        for now, X_virtual, X_real, frames in shown:
+            capture.add(now, virtual_pose(now, X_virtual, capture.kind.frame))
+            capture.add(now, real_pose(now, X_real, capture.kind.frame))
+            capture.add(now, frames)
 
-    def _packets(self, direction: Direction, end: float) -> Iterator[Timed]:
+    def _add_packets(self, direction: Direction, end: float) -> None:
         """Packets whose fate is known, and then those that are still on their way."""
-        settled = self._settled[direction]
+        settled = [record for record in self._settled[direction] if not record.copy]
         for record in settled:
-            yield link_entry(direction, record, record.size)
-        known_ones = {record.number for record in settled}
+            self._capture.add(*link_entry(direction, record, record.size))
+        known = {record.number for record in settled}
         for number, (sent, size) in enumerate(self._sent[direction]):
-            if number not in known_ones:
-                yield end, LinkEntry(direction, sent, size=size)
-
-    def _learned(self, drive: DriveRun) -> Iterator[Timed]:
-        """What came into the virtual environment and went; events are cells that are new, and that all are gone."""
-        before: set[tuple[int, int]] = set()
-        ever: set[tuple[int, int]] = set()
-        for t, cells in drive.learned:
-            now = set(cells)
-            if now == before:
-                continue
-            yield t, d.CellsEntry(t, _flat(sorted(now - before)), _flat(sorted(before - now)))
-            if new := len(now - ever):
-                text = f"the virtual environment learned {new} cell{'s' * (new > 1)}"
-                yield t, RunEvent(t, "learned", text)
-            elif not now:
-                yield t, RunEvent(t, "forgot", "the virtual environment forgot all that it had learned")
-            before, ever = now, ever | now
-
-
-def _flat(cells: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    return tuple(number for cell in cells for number in cell)
-
-
-def _pose(x: float, y: float, theta: float) -> Array:
-    c, s = np.cos(theta), np.sin(theta)
-    return np.array([[c, -s, 0.0, x], [s, c, 0.0, y], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+            if number not in known:
+                self._capture.add(end, LinkEntry(direction, sent, size=size))

@@ -1,15 +1,16 @@
-"""Recordings' robots on pages: two arms, or two mobile robots in their room."""
+"""Recordings' robots on pages: both of them, and of mobile robots their room and what they drove there."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 
 from interfaces.messages.recording import grid_of, room_of
+from interfaces.recording.kinds import ARM
 from interfaces.recording.playback import PlaybackFrame
-from interfaces.recording.recording import ARM, Recording
+from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from vrs.model import Array
@@ -20,46 +21,47 @@ THIN = 2
 """One of so many samples is a point of a path that is drawn."""
 
 
-class DriveStage:
-    """Two mobile robots, what they drove, the room, and what was learned of it."""
+class Stage:
+    """A recording's robots on a page."""
 
     def __init__(self, recording: Recording) -> None:
-        """Take what was driven, and make the scene.
+        """Make the scene.
 
         Raises:
             FormatError: If the room makes no sense.
         """
-        self._recording, facts, robot = recording, recording.session.drive, recording.robot
+        self._recording = recording
         self._until = -np.inf
         self._t: Array = np.empty(0)
         self._paths: dict[str, Array] = {}
-        self._grown()
-        entry = recording.room
-        room = None if entry is None else room_of(entry, str(recording.path))
-        grid = None if facts is None or facts.grid is None else grid_of(facts.grid)
-        self._learned_at, self._learned = _learned(recording)
-        extent = self._extent(recording.session.q, MARGIN * robot.base.body.length)
-        start, looks = recording.session.q, bodies(robot)
-        self.scene = TwinScene(robot, start, looks=looks, room=room, grid=grid, extent=extent)
+        """Where both drove by those times [m], (k, 2) each; none of arms."""
+        self._learned = _learned(recording)
+        around: dict[str, Any] = {}
+        if recording.kind is not ARM:
+            self._grown()
+            entry, facts = recording.room, recording.session.drive
+            around["start"] = recording.session.q
+            around["room"] = None if entry is None else room_of(entry, str(recording.path))
+            around["grid"] = None if facts is None or facts.grid is None else grid_of(facts.grid)
+            around["extent"] = self._extent()
+        self.scene = TwinScene(recording.robot, looks=bodies(recording.robot), **around)
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
         assert frame.q_virtual is not None
-        self._grown()
-        count = bisect_right(self._t, frame.t)
-        driven = {}
-        for twin, q in (("virtual", frame.q_virtual), ("real", frame.q_real)):
-            if q is not None and count:
-                driven[twin] = np.vstack([self._paths[twin][:count], q[None, :2]])
-        self.scene.show(
-            virtual=frame.q_virtual,
-            real=frame.q_real,
-            path=committed,
-            driven=driven,
-            learned=self._learned[bisect_right(self._learned_at, frame.t)],
-            t=frame.t,
-            now=now,
-        )
+        around: dict[str, Any] = {}
+        if self._paths:
+            self._grown()
+            count, changes = bisect_right(self._t, frame.t), self._learned
+            twins = (("virtual", frame.q_virtual), ("real", frame.q_real))
+            around["driven"] = {
+                twin: np.vstack([self._paths[twin][:count], q[None, :2]])
+                for twin, q in twins
+                if q is not None and count
+            }
+            around["learned"] = changes[bisect_right(changes, frame.t, key=lambda change: change[0]) - 1][1]
+            around["t"] = frame.t
+        self.scene.show(virtual=frame.q_virtual, real=frame.q_real, path=committed, now=now, **around)
 
     def _grown(self) -> None:
         """Take the paths as far as the file has come."""
@@ -75,44 +77,22 @@ class DriveStage:
         self._t = t[known]
         self._paths = {"virtual": virtual[known, :2], "real": track.q[::THIN][known, :2]}
 
-    def _extent(self, start: list[float], margin: float) -> Array:
+    def _extent(self) -> Array:
         """What is to be seen at first: where both drove, and so much around it [m]."""
-        points = np.vstack([np.array([start[:2]]), *self._paths.values()])
+        margin = MARGIN * self._recording.robot.base.body.length
+        points = np.vstack([np.array([self._recording.session.q[:2]]), *self._paths.values()])
         return np.array([points.min(axis=0) - margin, points.max(axis=0) + margin])
 
 
-def _learned(recording: Recording) -> tuple[list[float], list[tuple[tuple[int, int], ...]]]:
-    """When the cells of the virtual environment changed [s], and what they were before the first and after each."""
+def _learned(recording: Recording) -> list[tuple[float, tuple[tuple[int, int], ...]]]:
+    """When the cells of the virtual environment changed [s], and what they were from then on; none at first."""
     cells: set[tuple[int, int]] = set()
-    times: list[float] = []
-    found: list[tuple[tuple[int, int], ...]] = [()]
+    found: list[tuple[float, tuple[tuple[int, int], ...]]] = [(-np.inf, ())]
     for entry in recording.learned:
         cells |= set(zip(entry.added[::2], entry.added[1::2], strict=False))
         cells -= set(zip(entry.gone[::2], entry.gone[1::2], strict=False))
-        times.append(entry.t)
-        found.append(tuple(sorted(cells)))
-    return times, found
-
-
-class ArmStage:
-    """Two arms."""
-
-    def __init__(self, recording: Recording) -> None:
-        self.scene = TwinScene(recording.robot, looks=bodies(recording.robot))
-
-    def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
-        """Show a frame whose virtual robot is known."""
-        assert frame.q_virtual is not None
-        self.scene.show(virtual=frame.q_virtual, real=frame.q_real, path=committed, now=now)
-
-
-Stage: TypeAlias = ArmStage | DriveStage
-"""A recording's robots on a page."""
-
-
-def stage_of(recording: Recording) -> Stage:
-    """The robots of a recording for a page."""
-    return ArmStage(recording) if recording.kind is ARM else DriveStage(recording)
+        found.append((entry.t, tuple(sorted(cells))))
+    return found
 
 
 def prepare(recording: Recording) -> None:

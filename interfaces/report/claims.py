@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
-from importlib import resources
 from pathlib import Path
-from string import Template
 from typing import Any, Final
 
-from interfaces.lab.claims import interval_said, said
 from interfaces.lab.output import SCHEMA
-from interfaces.report.tables import table
+from interfaces.report.pages import page
 from vrs.errors import FormatError
 
 Json = Mapping[str, Any]
@@ -79,9 +74,14 @@ def _study(path: Path, document: Json) -> ClaimReport:
         facts,
         tuple(map(_claim, document["claims"])),
         tuple(map(_claim, document["timings"])),
-        tuple(document["tables"]),
+        tuple({**each, "rows": [list(map(_cell, row)) for row in each["rows"]]} for each in document["tables"]),
         tuple((figure["title"], _svg(path.parent / figure["file"])) for figure in document["figures"]),
     )
+
+
+def _cell(value: object) -> object:
+    """A cell of a table; what isn't there is blank."""
+    return "" if value is None else value
 
 
 def _claim(claim: Json) -> Json:
@@ -122,8 +122,6 @@ def _measured(name: str, result: Json) -> Json:
 PAGE: Final = "reproduce.html"
 DATA: Final = "reproduce.json"
 CLAIMS_SCHEMA: Final = "vrs-claims/1"
-HEAD: Final = ("claim", "", "expected", "measured", "interval", "source")
-"""Of the table; the verdict has no name."""
 
 
 def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> Path:
@@ -175,79 +173,4 @@ def render(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) ->
     everything = (*papers, *beyond)
     total, held = sum(found.total for found in everything), sum(found.held for found in everything)
     counts = (("claims", total), ("hold", held), ("don't", total - held), ("papers", len(papers)))
-    return Template(_asset("claims.html")).substitute(
-        title=f"{held} of {total} claims hold",
-        css=_asset("report.css"),
-        facts="".join(f"<li><span>{name}</span>{count}</li>" for name, count in counts),
-        papers=_sums(papers) + "".join(map(_section, papers)),
-        beyond=f"<h2>Beyond the papers</h2>{_sums(beyond)}{''.join(map(_section, beyond))}" if beyond else "",
-    )
-
-
-def _sums(found: Sequence[ClaimReport]) -> str:
-    return f'<div class="sums">{"".join(map(_sum, found))}</div>'
-
-
-def _sum(found: ClaimReport) -> str:
-    share = 100.0 * found.held / max(found.total, 1)
-    return (
-        f'<a class="card sum" href="#{escape(found.name)}"><b>{found.held}<small> of {found.total} hold</small></b>'
-        f'<i class="bar"><i style="width: {share:.1f}%"></i></i><span>{escape(found.title)}</span></a>'
-    )
-
-
-def _section(found: ClaimReport) -> str:
-    whole = " whole" if found.held == found.total else ""
-    facts = "".join(f"<li><span>{escape(name)}</span>{escape(value)}</li>" for name, value in found.facts)
-    timings = f"<h4>Speed of this machine</h4>{_claims(found.timings)}" if found.timings else ""
-    return (
-        f'<section class="card{whole}" id="{escape(found.name)}"><h3>{escape(found.title)}</h3>'
-        f'<ul class="facts">{facts}</ul>{_claims(found.claims)}{timings}{_tables(found)}{_pictures(found)}'
-        "</section>"
-    )
-
-
-def _claims(claims: Iterable[Json]) -> str:
-    head = "".join(f'<th scope="col">{name}</th>' for name in HEAD)
-    return (
-        f'<div class="scroll"><table class="claims"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(map(_row, claims))}</tbody></table></div>"
-    )
-
-
-def _row(claim: Json) -> str:
-    ends = interval_said(claim["interval"])
-    cells = said(claim["expected"]), said(claim["measured"]), ends, claim["source"]
-    verdict = "holds" if claim["holds"] else "fails"
-    return (
-        f'<tr class="{verdict}"><th scope="row">{escape(claim["claim"])}</th>'
-        f'<td class="verdict">{"✓ holds" if claim["holds"] else "✗ doesn’t"}</td>'
-        + "".join(f"<td>{escape(cell)}</td>" for cell in cells)
-        + "</tr>"
-    )
-
-
-def _tables(found: ClaimReport) -> str:
-    shown = [
-        f"<details><summary>{escape(each['title'])}</summary>"
-        f"{table(each['columns'], [[_blank(cell) for cell in row] for row in each['rows']])}</details>"
-        for each in found.tables
-    ]
-    return "".join(shown)
-
-
-def _pictures(found: ClaimReport) -> str:
-    shown = []
-    for title, svg in found.figures:
-        data = base64.b64encode(svg.encode("utf-8")).decode("ascii")
-        image = f'<img alt="{escape(title)}" loading="lazy" src="data:image/svg+xml;base64,{data}">'
-        shown.append(f"<figure>{image}<figcaption>{escape(title)}</figcaption></figure>")
-    return f'<div class="pictures">{"".join(shown)}</div>' if shown else ""
-
-
-def _blank(cell: object) -> object:
-    return "" if cell is None else cell
-
-
-def _asset(name: str) -> str:
-    return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
+    return page("claims.html", title=f"{held} of {total} claims hold", facts=counts, papers=papers, beyond=beyond)

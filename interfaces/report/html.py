@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import re
 from collections.abc import Mapping, Sequence
-from html import escape
 from importlib import resources
 from pathlib import Path
-from string import Template
 from typing import Any, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Figure
 from interfaces.lab.driving.output import of_drives
 from interfaces.messages.recording import RunEvent
-from interfaces.recording.figures import driven, figures_of
-from interfaces.recording.figures import figures as run_figures
+from interfaces.recording.figures import RunFigures
+from interfaces.recording.figures import figures as figures_of
 from interfaces.recording.recording import Recording
-from interfaces.report.plots import Plot, plots
+from interfaces.report.pages import page
+from interfaces.report.plots import plots
 from interfaces.report.scene import scene
-from interfaces.report.tables import FIGURES, card, figures, receipts, shown, table, tiles, words
+from interfaces.report.tables import FIGURES, figures, receipts, shown, tiles, words
 from interfaces.runs.drive_run import DriveRun
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import TwinRun
@@ -48,24 +44,24 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
     """Return the report as one HTML text."""
     viewer, licences = viewer_bundle()
     drawn, data = plots(run), scene(run)
-    return Template(_asset("report.html")).substitute(
-        title=escape(run.session.title or "Twin run"),
-        css=_asset("report.css"),
+    return page(
+        "report.html",
+        title=run.session.title or "Twin run",
         facts=_facts(run, summary),
         tiles=tiles(summary),
-        plots="".join(_figure(plot) for plot in drawn if not plot.is_joint),
-        joints="".join(_figure(plot) for plot in drawn if plot.is_joint),
+        plots=drawn,
         figures=figures(summary),
-        receipts=receipts("Virtual robot", run.receipts_virtual) + receipts("Real robot", run.receipts_real),
-        events=_events(run),
-        licences=escape(licences),
-        data=_script_json(data),
+        receipts_virtual=receipts(run.receipts_virtual),
+        receipts_real=receipts(run.receipts_real),
+        happened=_happened(run.events),
+        licences=licences,
+        data=data,
         viewer=_script(viewer),
         script=_script(_page_script(data)),
     )
 
 
-def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
+def _facts(run: TwinRun, summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     order = ", then ".join(words(str(cause)) for cause in summary.get("attribution_order", ()))
     facts = {
         "robot": run.model.name,
@@ -81,7 +77,7 @@ def _facts(run: TwinRun, summary: Mapping[str, Any]) -> str:
         "commands": str(len(run.receipts_virtual)),
         "counterfactuals off": order,
     }
-    return "".join(f"<li><span>{name}</span>{escape(value)}</li>" for name, value in facts.items() if value)
+    return [(name, value) for name, value in facts.items() if value]
 
 
 def _span(run: TwinRun) -> str:
@@ -90,44 +86,19 @@ def _span(run: TwinRun) -> str:
     return text.replace("-", "−")
 
 
-def _figure(plot: Plot) -> str:
-    note = f"<figcaption>{escape(plot.note)}</figcaption>" if plot.note else ""
-    cursor = (
-        f'<div class="cursor" hidden data-low="{plot.low!r}" data-high="{plot.high!r}" '
-        f'data-left="{plot.left:.5f}" data-right="{plot.right:.5f}"></div>'
-    )
-    return (
-        f'<figure class="card" id="plot-{plot.name}"><h3>{escape(plot.title)}</h3>'
-        f'<div class="plot">{plot.svg}{cursor}</div>{note}</figure>'
-    )
-
-
-def _events(run: TwinRun) -> str:
-    if not run.events:
-        return ""
-    rows = [(f"{event.t:.2f} s", event.kind, event.text) for event in run.events]
-    return "<h2>Events</h2>" + card("By user time", table(("time", "kind", "what"), rows))
-
-
-def _asset(name: str) -> str:
-    return resources.files("interfaces.report").joinpath(name).read_text(encoding="utf-8")
+def _happened(events: Sequence[RunEvent]) -> list[tuple[str, str, str]]:
+    return [(f"{event.t:.2f} s", event.kind, event.text) for event in events]
 
 
 def _page_script(data: Mapping[str, Any]) -> str:
     """The page's script; where the chain is one of screws, with the station's `Chain` for its own kinematics."""
-    text = _asset("report.js")
+    text = resources.files("interfaces.report").joinpath("report.js").read_text(encoding="utf-8")
     if "home" not in data:
         return text
     chain = resources.files("interfaces.station").joinpath("static/chain.js").read_text(encoding="utf-8")
     own, following = text.index("  // Column-major products"), text.index("  // Corner normals")
     links = "  const links = (q) => new Chain({ home: run.home, screws: run.chain }).links(q);\n\n"
     return chain.replace("export ", "") + text[:own] + links + text[following:]
-
-
-def _script_json(value: object) -> str:
-    """JSON that no browser takes for markup."""
-    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _script(text: str) -> str:
@@ -148,27 +119,18 @@ def render_drive(drive: DriveRun, summary: Mapping[str, Any], events: Sequence[R
         events: What else happened.
     """
     case = drive.case
-    rows = [(name, shown(summary[key], scale, unit), unit) for key, name, scale, unit in FIGURES]
-    facts = "".join(f"<li><span>{name}</span>{escape(str(summary[name]))}</li>" for name in FACTS)
-    facts += f"<li><span>duration</span>{summary['duration_s']:.1f} s</li>"
+    facts = [(name, str(summary[name])) for name in FACTS]
+    facts.append(("duration", f"{summary['duration_s']:.1f} s"))
     if summary["gap_s"] > 0:
-        facts += f"<li><span>not measured</span>{summary['gap_s']:.1f} s</li>"
-    drawn = of_drives({f"{case.architecture}, {case.transport}": drive}, f"{case.robot}, {case.operator}")
-    happened = [(f"{event.t:.2f} s", event.kind, event.text) for event in events]
-    return Template(_asset("drive.html")).substitute(
-        title=escape(str(summary["title"])),
-        css=_asset("report.css"),
+        facts.append(("not measured", f"{summary['gap_s']:.1f} s"))
+    return page(
+        "drive.html",
+        title=str(summary["title"]),
         facts=facts,
-        figures=card("By the definitions of docs/lab.md", table(("", "value", "unit"), rows)),
-        pictures="".join(_picture(figure) for figure in drawn),
-        events="<h2>Events</h2>" + card("By time", table(("time", "kind", "what"), happened)) if happened else "",
+        figures=[(name, shown(summary[key], scale, unit), unit) for key, name, scale, unit in FIGURES],
+        pictures=of_drives({f"{case.architecture}, {case.transport}": drive}, f"{case.robot}, {case.operator}"),
+        happened=_happened(events),
     )
-
-
-def _picture(figure: Figure) -> str:
-    data = base64.b64encode(figure.svg.encode("utf-8")).decode("ascii")
-    image = f'<img alt="{escape(figure.title)}" src="data:image/svg+xml;base64,{data}">'
-    return f'<figure class="card picture">{image}</figure>'
 
 
 MOST_SAMPLES: Final = 1200
@@ -183,10 +145,7 @@ class Framed:
         self.page, self.height = page, height
 
     def _repr_html_(self) -> str:
-        return (
-            f'<iframe srcdoc="{escape(self.page)}" sandbox="allow-scripts" title="Both robots" loading="lazy" '
-            f'style="width: 100%; height: {self.height}px; border: 0; border-radius: 12px"></iframe>'
-        )
+        return page("frame.html", page=self.page, height=self.height)
 
 
 def inline_report(run: TwinRun, *, height: int = 760) -> Framed:
@@ -196,8 +155,6 @@ def inline_report(run: TwinRun, *, height: int = 760) -> Framed:
         run: Both arms.
         height: Of the frame [px].
     """
-    from interfaces.runs.summary import summarize
-
     return Framed(render(run, summarize(run)), height)
 
 
@@ -208,10 +165,8 @@ def inline_drive(drive: DriveRun, *, height: int = 560) -> Framed:
         drive: The run.
         height: Of the frame [px].
     """
-    data = json.dumps(_drive(drive), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    text = resources.files("interfaces.report").joinpath("inline.html").read_text(encoding="utf-8")
     case = drive.case
-    return Framed(Template(text).substitute(title=escape(f"{case.architecture}, {case.delay}"), data=data), height)
+    return Framed(page("inline.html", title=f"{case.architecture}, {case.delay}", data=_drive(drive)), height)
 
 
 def _drive(drive: DriveRun) -> dict[str, Any]:
@@ -232,8 +187,7 @@ def render_recording(recording: Recording) -> tuple[str, tuple[str, ...]]:
     Raises:
         FormatError: If the recording has too little of it.
     """
-    if recording.session.drive is None:
-        arm = run_figures(recording)
-        return render(arm.run, summarize(arm.run, arm.attributions, arm.offsets)), arm.missing
-    found = driven(recording)
-    return render_drive(found.drive, figures_of(recording, found), recording.events), found.missing
+    found = figures_of(recording)
+    if isinstance(found, RunFigures):
+        return render(found.run, found.summary()), tuple(found.missing)
+    return render_drive(found.run, found.summary(), recording.events), tuple(found.missing)

@@ -1,9 +1,8 @@
-"""Tables of a run's figures, for a terminal and as HTML; all that a user or a run gives is escaped in HTML."""
+"""Tables of a run's figures: for a terminal, and as rows for a page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from vrs.ledger import Receipt
@@ -222,45 +221,15 @@ SUFFIXES: Final = {"_deg": "deg", "_rad": "rad", "_m": "mm", "_s": "s"}
 SCALES: Final = {"mm": 1e3, "%": 100.0}
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, markup: bool = False) -> str:
-    """Build a table whose first column names the row and whose numbers stand right.
-
-    Args:
-        head: Column heads.
-        rows: Cells; texts are escaped.
-        markup: Whether cells that are texts are HTML already.
-    """
-    body = [[_cell(value, markup) for value in row] for row in rows]
-    numeric = [
-        bool(body) and all(row[i][1] for row in body) and any(row[i][0] != "–" for row in body)
-        for i in range(len(head))
-    ]
-    style = [' class="number"' if is_number else "" for is_number in numeric]
-    top = "".join(f'<th scope="col"{style[i]}>{escape(text)}</th>' for i, text in enumerate(head))
-    lines = []
-    for row in body:
-        first = f'<th scope="row"{style[0]}>{row[0][0]}</th>'
-        rest = "".join(f"<td{style[i + 1]}>{text}</td>" for i, (text, _) in enumerate(row[1:]))
-        lines.append(f"<tr>{first}{rest}</tr>")
-    thead = f"<thead><tr>{top}</tr></thead>" if any(head) else ""
-    return f'<div class="scroll"><table>{thead}<tbody>{"".join(lines)}</tbody></table></div>'
-
-
-def card(title: str, body: str, note: str = "", *, wide: bool = False) -> str:
-    """Frame a piece of the page."""
-    hint = f'<p class="note">{escape(note)}</p>' if note else ""
-    return f'<section class="card{" wide" if wide else ""}"><h3>{escape(title)}</h3>{body}{hint}</section>'
-
-
-def tiles(summary: Json) -> str:
-    """Build the few figures that a reader looks for first, as far as the summary has them."""
+def tiles(summary: Json) -> list[tuple[str, str]]:
+    """The few figures that a reader looks for first, as far as the summary has them: values, and what they are."""
     timeline = _part(_part(summary, "errors"), "timeline_time")
     user = _part(_part(summary, "errors"), "user_time")
     path, commands = _part(summary, "path"), _part(summary, "commands")
     joint_rms = [x for x in timeline.get("joint_rms_deg") or () if x is not None] or [None]
     late, lost, behind = commands.get("late"), commands.get("lost"), _part(summary, "behind")
     shares = [behind.get("mean_s"), summary.get("lag_timeline_s")]
-    played = None if None in shares else " + ".join(map(_number, shares))
+    played = None if None in shares else " + ".join(map(number, shares))
     found = [
         (_with_unit(max(joint_rms, key=lambda x: x or 0.0), "deg"), "worst joint, rms, equal timeline time"),
         (_with_unit(timeline.get("tool_rms_m"), "mm"), "tool, rms, equal timeline time"),
@@ -269,55 +238,50 @@ def tiles(summary: Json) -> str:
         (None if played is None else f"{played} s", "network: behind by the clock, mean; control: the joints' lag"),
         (None if late is None or lost is None else f"{late} / {lost}", "commands late / lost"),
     ]
-    shown = [
-        f'<div class="card tile"><b>{escape(value)}</b><span>{escape(label)}</span></div>'
-        for value, label in found
-        if value is not None
-    ]
-    return f'<h2>In short</h2><div class="tiles">{"".join(shown)}</div>' if shown else ""
+    return [(value, label) for value, label in found if value is not None]
 
 
-def figures(summary: Json) -> str:
-    """Build the tables of every figure in a summary, also of those that this module doesn't know by name."""
-    out = []
+Sheet = tuple[str, Sequence[str], Sequence[Sequence[object]], str, bool]
+"""A table's title, column heads and rows, a note, and whether it's wide."""
+
+
+def figures(summary: Json) -> list[Sheet]:
+    """The tables of every figure in a summary, also of those that this module doesn't know by name."""
+    out: list[Sheet] = []
     if errors := _part(summary, "errors"):
-        out.append(card("Errors, real against virtual", _errors(errors), wide=True))
+        out.append(("Errors, real against virtual", *_errors(errors), "", True))
     if attribution := summary.get("attribution"):
         order = [str(cause) for cause in summary.get("attribution_order", attribution[0]["parts"])]
         note = f"Counterfactual runs, switched off one after the other: {', then '.join(map(words, order))}."
-        out.append(card("Where the error comes from (rms)", _attribution(attribution, order), note, wide=True))
+        out.append(("Where the error comes from (rms)", *_attribution(attribution, order), note, True))
     if offsets := summary.get("offsets"):
         note = (
             "The same messages with the same delays. A fixed offset postpones commands that take longer; an "
             "adaptive one slows the robot down along the committed path. The body follows exactly here, so that "
             "what is left is the network's."
         )
-        body = table(OFFSETS, offset_rows({"offsets": offsets}))
-        out.append(card("What the choice of the offset does", body, note, wide=True))
+        out.append(("What the choice of the offset does", OFFSETS, offset_rows({"offsets": offsets}), note, True))
     if path := _part(summary, "path"):
         rows = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
-        out.append(card("Tool path and time difference, user time", table(("", ""), rows)))
+        out.append(("Tool path and time difference, user time", ("", ""), rows, "", False))
     if commands := _part(summary, "commands"):
-        out.append(card("Commands", table(("", ""), _flat(commands))))
+        out.append(("Commands", ("", ""), _flat(commands), "", False))
     rest = {name: value for name, value in summary.items() if name not in ELSEWHERE}
     if rest:
-        out.append(card("The run", table(("", ""), _flat(rest))))
-    return "".join(out)
+        out.append(("The run", ("", ""), _flat(rest), "", False))
+    return out
 
 
-def receipts(title: str, items: Sequence[Receipt]) -> str:
-    """Build the table of one engine's receipts."""
-    head = ("id", "status", "asked [s]", "execute [s]", "end [s]", "reason")
-    rows = []
+def receipts(items: Sequence[Receipt]) -> list[tuple[object, ...]]:
+    """One engine's receipts, a row each."""
+    rows: list[tuple[object, ...]] = []
     for r in items:
-        status = f'<span class="status status-{escape(str(r.status))}">{escape(str(r.status))}</span>'
         reason = r.reason
         if r.superseded_by is not None:
             by = r.superseded_by or "a correction"
             reason += f"{'; ' if reason else ''}superseded by {by}"
-        rows.append((str(r.command_id), status, r.asked_at, r.execute_at, r.end, escape(reason)))
-    body = table(head, rows, markup=True) if rows else '<p class="note">None.</p>'
-    return card(title, body)
+        rows.append((str(r.command_id), r.status, r.asked_at, r.execute_at, r.end, reason))
+    return rows
 
 
 def words(name: str) -> str:
@@ -327,7 +291,7 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _errors(errors: Json) -> str:
+def _errors(errors: Json) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
     columns = [str(key) for key in errors]
     names: dict[str, None] = {str(name): None for key in columns for name in errors[key]}
     rows: list[list[object]] = []
@@ -340,16 +304,16 @@ def _errors(errors: Json) -> str:
         for j in range(size):
             label = _label(name.replace("joint_", f"joint_{j + 1}_", 1), unit)
             rows.append([label, *(_scaled(v[j], unit) if isinstance(v, list) else None for v in values)])
-    return table(("", *(COMPARISONS.get(key, words(key)) for key in columns)), rows)
+    return ("", *(COMPARISONS.get(key, words(key)) for key in columns)), rows
 
 
-def _attribution(items: Sequence[Json], order: Sequence[str]) -> str:
+def _attribution(items: Sequence[Json], order: Sequence[str]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
     rows = []
     for item in items:
         label, scale, unit = MEASURES.get(item["measure"], (words(item["measure"]), 1.0, _unit(item["measure"])))
         values = [item["total"], *(item["parts"].get(cause) for cause in order), item["residual"]]
         rows.append([f"{label} [{unit}]", *(None if v is None else scale * float(v) for v in values)])
-    return table(("", "total", *map(words, order), "residual"), rows)
+    return ("", "total", *map(words, order), "residual"), rows
 
 
 def _flat(values: Json, prefix: str = "") -> list[tuple[str, object]]:
@@ -359,7 +323,7 @@ def _flat(values: Json, prefix: str = "") -> list[tuple[str, object]]:
         if isinstance(value, Mapping):
             rows.extend(_flat(value, f"{label}: "))
         elif isinstance(value, (list, tuple)):
-            rows.append((label, ", ".join(_number(x) if isinstance(x, float) else str(x) for x in value)))
+            rows.append((label, ", ".join(number(x) if isinstance(x, float) else str(x) for x in value)))
         else:
             rows.append((label, _with_unit(value, _unit(str(name)))))
     return rows
@@ -390,20 +354,12 @@ def _with_unit(value: object, unit: str) -> str | None:
     """Text of a figure in its unit; None where it isn't defined."""
     if value is None or isinstance(value, str):
         return value
-    text = _number(_scaled(value, unit))
+    text = number(_scaled(value, unit))
     return f"{text} {unit}" if unit else text
 
 
-def _number(value: object) -> str:
+def number(value: object) -> str:
+    """A figure's text: three digits behind the point, none from 10,000 on."""
     if isinstance(value, bool) or not isinstance(value, float):
         return str(value)
     return f"{value:.0f}" if abs(value) >= 1e4 else f"{round(value, 3) + 0.0:.3f}".replace("-", "−")
-
-
-def _cell(value: object, markup: bool) -> tuple[str, bool]:
-    """A cell's HTML and whether it may stand in a column of numbers."""
-    if value is None:
-        return "–", True
-    if isinstance(value, str):
-        return (value if markup else escape(value)), False
-    return escape(_number(value)), True

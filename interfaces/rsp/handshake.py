@@ -63,15 +63,6 @@ class Open(NamedTuple):
     cookie: bytes = NO_COOKIE
 
 
-class HandshakeAnswer(NamedTuple):
-    """CHALLENGE or OPENED."""
-
-    nonce: bytes
-    """What OPEN had."""
-    given: bytes
-    """The cookie, or the robot's nonce."""
-
-
 def encode_open(asked: Open) -> bytes:
     """The body of OPEN."""
     return _OPEN.pack(asked.rank, asked.takeover, asked.nonce, asked.cookie)
@@ -91,20 +82,26 @@ def decode_open(body: bytes) -> Open:
     return Open(Rank(rank), takeover == 1, nonce, cookie)
 
 
-def encode_answer(answer: HandshakeAnswer) -> bytes:
-    """The body of CHALLENGE or OPENED."""
-    return _ANSWER.pack(*answer)
+def encode_answer(nonce: bytes, given: bytes) -> bytes:
+    """The body of CHALLENGE or OPENED.
+
+    Args:
+        nonce: What OPEN had.
+        given: The cookie, or the robot's nonce.
+    """
+    return _ANSWER.pack(nonce, given)
 
 
-def decode_answer(body: bytes) -> HandshakeAnswer:
-    """Read the body of CHALLENGE or OPENED.
+def decode_answer(body: bytes) -> tuple[bytes, bytes]:
+    """Read the body of CHALLENGE or OPENED: OPEN's nonce, and the cookie or the robot's nonce.
 
     Raises:
         PacketError: If it isn't one.
     """
     if len(body) != _ANSWER.size:
         raise PacketError("the length of its body")
-    return HandshakeAnswer(*_ANSWER.unpack(body))
+    nonce, given = _ANSWER.unpack(body)
+    return nonce, given
 
 
 def encode_refused(nonce: bytes, refusal: SessionRefusal) -> bytes:
@@ -245,7 +242,7 @@ class SessionDoor:
 
         if not proven:
             cookie = self._cookies.cookie(address, asked.nonce, now)
-            return answer(PacketType.CHALLENGE, encode_answer(HandshakeAnswer(asked.nonce, cookie)))
+            return answer(PacketType.CHALLENGE, encode_answer(asked.nonce, cookie))
         refusal = self._refusal(asked, heard, now)
         if refusal is not None:
             return answer(PacketType.REFUSED, encode_refused(asked.nonce, refusal))
@@ -254,7 +251,7 @@ class SessionDoor:
             if claim is not None and claim.address != address:
                 over = [(claim.session.make(PacketType.ENDED, b"", now), claim.address)]
             claim = self.pending = self._claim(asked, address, head.stamp)
-        given = encode_answer(HandshakeAnswer(claim.nonce, claim.given))
+        given = encode_answer(claim.nonce, claim.given)
         return [*over, *answer(PacketType.OPENED, given, claim.session.id)]
 
     def _refusal(self, asked: Open, heard: float | None, now: float) -> SessionRefusal | None:

@@ -10,7 +10,7 @@ from typing import Final, Protocol
 
 from interfaces.rsp.model.elements import Command, Effector, Event, MemoryCommand, Scalar, Sensor
 from interfaces.rsp.motion_filter import Values
-from interfaces.rsp.outputs import Cleared, Commanded, Stored
+from interfaces.rsp.outputs import Commanded, RobotChange, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.session import SLACK
 from vrs.checks import number_in
@@ -120,7 +120,7 @@ class RspHost:
                     element = self.model.elements[index]
                     assert isinstance(element, MemoryCommand)
                     self.body.carry_out(element.binding or element.name, (float(len(data)),))
-                case Cleared():
+                case RobotChange.CLEARED:
                     self.body.sound(None)
         while self._sound <= now + SLACK:
             self._sound += FRAGMENT_TIME

@@ -18,7 +18,7 @@ from interfaces.rsp.header import MODULUS, Header, PacketType
 from interfaces.rsp.layout import ID, Layout, PacketDirection
 from interfaces.rsp.model.elements import Effector, Event, MemoryCommand, MemoryEvent, RobotModel
 from interfaces.rsp.motion_filter import Fastest
-from interfaces.rsp.outbox import CommandOutbox, DeliveryOutcome, MemoryInbox, MemoryOutbox, Settled, StreamOutbox
+from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, StreamOutbox, ValueOutbox
 from interfaces.rsp.outputs import Began, EndReason, LocalOutput, Occurred, Refused, SessionEnded, Stored, Told
 from interfaces.rsp.session import (
     SLACK,
@@ -152,17 +152,6 @@ class LocalConfig:
     more."""
 
 
-@dataclass(slots=True)
-class _Written:
-    """An effector's values as the simulacrum has them."""
-
-    payload: bytes
-    first: int = -1
-    """Number of the first packet that had them."""
-    known: bool = False
-    """Whether the robot has them."""
-
-
 class LocalCore:
     """The local system of one robot."""
 
@@ -211,7 +200,7 @@ class LocalCore:
         self.command_outbox, self._inbox = CommandOutbox(), MemoryInbox()
         self.memory_outbox = MemoryOutbox(self.layout.room[PacketDirection.DOWN])
         """What isn't acknowledged."""
-        self._written: dict[int, _Written] = {}
+        self._values = ValueOutbox()
         self._events: dict[int, int] = {}
         self.packet_round_trip = PacketRoundTrip()
         self._clears = 0
@@ -250,9 +239,7 @@ class LocalCore:
 
     def write(self, index: int, payload: bytes) -> None:
         """Set an effector's values, as they are on the wire."""
-        written = self._written.get(index)
-        if written is None or written.payload != payload:
-            self._written[index] = _Written(payload)
+        self._values.put(index, payload)
 
     def activate(self, index: int, on: bool) -> None:
         """Let an effector's values be in every packet, or only until the robot has them."""
@@ -343,11 +330,7 @@ class LocalCore:
     def _down(self, session: SessionNumbers, now: float) -> bytes:
         number = session.number
         payloads: dict[int, bytes] = dict.fromkeys(self._requested, b"")
-        for index, written in self._written.items():
-            if written.first < 0:
-                written.first = number
-            if not written.known or index in self._active:
-                payloads[index] = written.payload
+        self._values.fill(payloads, number, self._values.unknown | self._active)
         self.command_outbox.fill(payloads, number)
         self.memory_outbox.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
         self._inbox.fill(payloads, number)
@@ -391,19 +374,19 @@ class LocalCore:
             self.waiting_outputs.append(Refused(refusal))
             self.state, self.numbers = LocalState.CLOSED, None
             return
-        answer = handshake.decode_answer(body)
-        if answer.nonce != self.opening.nonce:
+        nonce, given = handshake.decode_answer(body)
+        if nonce != self.opening.nonce:
             raise PacketDropped(DropReason.SESSION)
         if head.type is PacketType.CHALLENGE:
             if self.opening.cookie == handshake.NO_COOKIE:
                 # Somebody is there: the second round trip has as much time as the first.
                 self._until = now + self._config.patience
-            if self.opening.cookie != answer.given:
-                self.opening, self._next = self.opening._replace(cookie=answer.given), now
+            if self.opening.cookie != given:
+                self.opening, self._next = self.opening._replace(cookie=given), now
             return
         cipher = None
         if self._keys is not None:
-            down, up = self._keys.session(self._rank, answer.nonce + answer.given, head.session)
+            down, up = self._keys.session(self._rank, nonce + given, head.session)
             cipher = PacketCipher(down, up)
         self.numbers = SessionNumbers(self.model.id, head.session, cipher)
         self.state, self._heard, self._next = LocalState.OPEN, now, now
@@ -414,9 +397,7 @@ class LocalCore:
         self.waiting_outputs += self.command_outbox.acknowledge(last)
         self._inbox.heard(last)
         self.streams.report(head.buffers, last)
-        for written in self._written.values():
-            if not written.known and 0 <= written.first <= last:
-                written.known = True
+        self._values.acknowledge(last)
         seconds = self.packet_round_trip.acknowledged(last, now)
         if seconds is not None:
             self.period.round_trip(seconds, now=now)
@@ -447,12 +428,10 @@ class LocalCore:
     def _close(self, reason: EndReason) -> None:
         session = 0 if self.numbers is None else self.numbers.id
         self.waiting_outputs += [
-            Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.command_outbox.drain()
+            *self.command_outbox.drain(),
+            *self.memory_outbox.drain(),
+            SessionEnded(session, reason),
         ]
-        self.waiting_outputs += [
-            Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in self.memory_outbox.drain()
-        ]
-        self.waiting_outputs.append(SessionEnded(session, reason))
         self.state, self.numbers = LocalState.CLOSED, None
 
 

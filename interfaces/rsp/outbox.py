@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
+from collections.abc import Set
 from dataclasses import dataclass
 from typing import Final
 
@@ -35,6 +36,41 @@ class Settled:
     id: int
     """As it was given out."""
     outcome: DeliveryOutcome
+
+
+class ValueOutbox:
+    """Newest values by element: each is told until the other side is known to have it."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self._payloads: dict[int, bytes] = {}
+        self._first: dict[int, int] = {}
+
+    @property
+    def unknown(self) -> Set[int]:
+        """Elements whose values the other side may not have."""
+        return self._first.keys()
+
+    def put(self, index: int, payload: bytes) -> None:
+        """Set an element's values, as they are on the wire."""
+        if self._payloads.get(index) != payload:
+            self._payloads[index], self._first[index] = payload, -1
+
+    def forget(self, indices: Set[int] | None = None) -> None:
+        """Take it that the other side has no values of these elements, or of any."""
+        lost = self._payloads.keys() if indices is None else self._payloads.keys() & indices
+        self._first |= dict.fromkeys(lost, -1)
+
+    def fill(self, payloads: dict[int, bytes], packet: int, indices: Set[int]) -> None:
+        """Add those of these elements that have values to a packet of a number."""
+        for index in self._payloads.keys() & indices:
+            if self._first.get(index) == -1:
+                self._first[index] = packet
+            payloads[index] = self._payloads[index]
+
+    def acknowledge(self, last: int) -> None:
+        """Take the newest of our packets that the other side has: whose first packet isn't newer is known."""
+        self._first = {index: first for index, first in self._first.items() if not 0 <= first <= last}
 
 
 @dataclass(slots=True)

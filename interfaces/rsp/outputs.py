@@ -78,20 +78,16 @@ class Stored:
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Cleared:
+class RobotChange(enum.Enum):
+    """What else becomes of a robot."""
+
+    CLEARED = enum.auto()
     """The data buffer was cleared: what is being played ends."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinkLost:
+    LINK_LOST = enum.auto()
     """Nothing came for the time of the watchdog: effectors that rest on loss do so."""
-
-
-@dataclass(frozen=True, slots=True)
-class LinkRestored:
+    LINK_RESTORED = enum.auto()
     """Something came again."""
 
 
 LocalOutput: TypeAlias = Began | Refused | SessionEnded | Told | Occurred | Stored | Settled
-RobotOutput: TypeAlias = Began | SessionEnded | Commanded | Stored | Cleared | LinkLost | LinkRestored | Settled
+RobotOutput: TypeAlias = Began | SessionEnded | Commanded | Stored | RobotChange | Settled

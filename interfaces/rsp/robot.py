@@ -28,14 +28,12 @@ from interfaces.rsp.model.elements import (
     Scalar,
 )
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig, Values
-from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox, StreamInbox
+from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox, StreamInbox, ValueOutbox
 from interfaces.rsp.outputs import (
     Began,
-    Cleared,
     Commanded,
     EndReason,
-    LinkLost,
-    LinkRestored,
+    RobotChange,
     RobotOutput,
     SessionEnded,
     Stored,
@@ -45,17 +43,6 @@ from vrs.checks import validated, within
 
 MOST_EVENTS: Final = 256
 """Events of an element that wait to be told."""
-
-
-@dataclass(slots=True)
-class _Measured:
-    """What a sensor says."""
-
-    payload: bytes
-    first: int = -1
-    """Number of the first packet that had it."""
-    known: bool = False
-    """Whether the local system has it."""
 
 
 @dataclass(slots=True)
@@ -89,9 +76,7 @@ class Telling:
         for index, element in enumerate(model):
             if isinstance(element, Monitor):
                 self.monitors.setdefault(model.index(element.effector), []).append(index)
-        self._measured: dict[int, _Measured] = {}
-        self._unknown: set[int] = set()
-        """What is measured and perhaps not known."""
+        self._measured = ValueOutbox()
         self._events: dict[int, _Events] = {}
         self._requested: frozenset[int] = frozenset()
         self._bits: frozenset[int] = frozenset()
@@ -100,16 +85,11 @@ class Telling:
         """Begin a session: nothing is known or asked for."""
         self._events.clear()
         self._requested = self._bits = frozenset()
-        for measured in self._measured.values():
-            measured.first, measured.known = -1, False
-        self._unknown = set(self._measured)
+        self._measured.forget()
 
     def measure(self, index: int, payload: bytes) -> None:
         """Set what a sensor or a monitor says."""
-        measured = self._measured.get(index)
-        if measured is None or measured.payload != payload:
-            self._measured[index] = _Measured(payload)
-            self._unknown.add(index)
+        self._measured.put(index, payload)
 
     def occur(self, index: int, payload: bytes) -> bool:
         """Tell of an event; returns whether it will be told: somebody asked for it, and not too many wait."""
@@ -131,28 +111,16 @@ class Telling:
         asked = frozenset().union(
             bits - self._members.keys(), *(self._members[i] for i in bits & self._members.keys())
         )
-        for index in asked - self._requested:
-            measured = self._measured.get(index)
-            if measured is not None:
-                measured.first, measured.known = -1, False
-                self._unknown.add(index)
+        self._measured.forget(asked - self._requested)
         self._requested = asked
 
     def heard(self, last: int) -> None:
         """Take the newest of our packets that the local system has."""
-        for index in tuple(self._unknown):
-            measured = self._measured[index]
-            if 0 <= measured.first <= last:
-                measured.known = True
-                self._unknown.discard(index)
+        self._measured.acknowledge(last)
 
     def fill(self, payloads: dict[int, bytes], packet: int) -> None:
         """Add what is to be told to a packet of a number."""
-        for index in self._unknown & self._requested:
-            measured = self._measured[index]
-            if measured.first < 0:
-                measured.first = packet
-            payloads[index] = measured.payload
+        self._measured.fill(payloads, packet, self._measured.unknown & self._requested)
         for index, events in self._events.items():
             if events.waiting:
                 payloads[index] = events.waiting[0]
@@ -392,7 +360,7 @@ class RobotCore:
         self.waiting_outputs += [
             *self.memory_outbox.drain(),
             SessionEnded(self.claim.session.id, reason),
-            Cleared(),
+            RobotChange.CLEARED,
         ]
         self._over, self.claim = self.claim, None
         self._reset(now)
@@ -444,7 +412,7 @@ class RobotCore:
         if head.buffers != self._clears:
             self._clears = head.buffers
             self.streams.clear()
-            self.waiting_outputs.append(Cleared())
+            self.waiting_outputs.append(RobotChange.CLEARED)
         claim.stamp = unwrapped(head.stamp, claim.stamp, STAMPS)
         self.motion.receive(1e-3 * claim.stamp, told, now=now)
         self._told |= told
@@ -503,7 +471,7 @@ class RobotCore:
                     assert isinstance(element, Effector)
                     self.motion.set(index, (element.initial,) * element.count)
                     self._changed.add(index)
-            self.waiting_outputs.append(LinkLost())
+            self.waiting_outputs.append(RobotChange.LINK_LOST)
 
     def _find(self, told: Mapping[int, Values]) -> None:
         """Go on with what was told last: the local system takes it as known; but for what is told anew."""
@@ -512,7 +480,7 @@ class RobotCore:
             if self._rests(index) and index not in told:
                 self.motion.set(index, values)
                 self._changed.add(index)
-        self.waiting_outputs.append(LinkRestored())
+        self.waiting_outputs.append(RobotChange.LINK_RESTORED)
 
     def _rests(self, index: int) -> bool:
         element = self.model.elements[index]

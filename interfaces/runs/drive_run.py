@@ -9,11 +9,12 @@ import numpy as np
 
 from interfaces.link.link import Link
 from interfaces.messages.drive_sites import ArchitectureReport, ArcPacket
+from interfaces.messages.recording import Direction
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import MobileReality
-from robots.ipr.robot import PLACES, Collision, MobileRobot
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE, USUAL_BASE, Robot, load
 from vrs.checks import one_of, validated, within
@@ -47,6 +48,8 @@ class DriveCase:
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""
+    known: Robot | None = field(default=None, repr=False, compare=False)
+    """The robot, where somebody has it; else it's found by what `robot` says."""
 
     @property
     def group(self) -> tuple[str, str, str, str, str]:
@@ -61,7 +64,9 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        return (load(USUAL_BASE), BARE) if self.robot == BARE else (load(self.robot), "")
+        if self.robot == BARE:
+            return load(USUAL_BASE), BARE
+        return load(self.robot) if self.known is None else self.known, ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
@@ -109,7 +114,10 @@ class DriveRun:
         """How many drives were beyond the robot's limits of speed and acceleration."""
         limits, slack = self.case.real[0].base.limits, 1 + 1e-9
         v, w = self.drives.T
-        rise = np.abs(np.diff(v, prepend=0.0)) > limits.a_max * CONTROL * slack + 1e-12
+        lasted = np.diff(self.t, prepend=self.t[0] - CONTROL)
+        rise = (
+            np.abs(np.diff(v, prepend=0.0 if self.t[0] < CONTROL else v[0])) > limits.a_max * lasted * slack + 1e-12
+        )
         return int(np.sum(rise | (np.abs(v) > limits.v_max * slack) | (np.abs(w) > limits.w_max * slack)))
 
     def match(self) -> PathMatch:
@@ -129,7 +137,7 @@ class Witness(Protocol):
     ) -> None:
         """The run begins; the site and the link tell those who listen."""
 
-    def sent(self, direction: str, now: float, size: int) -> None:
+    def sent(self, direction: Direction, now: float, size: int) -> None:
         """A packet of so many bytes goes `forward` or `backward` now [s]."""
 
 

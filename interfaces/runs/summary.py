@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -124,13 +125,9 @@ def summarize(
     }
     value = {
         "schema": SCHEMA,
-        "title": run.session.title,
+        **facts(run.session, "title", "delay", "service", "link_loss", "offset"),
         "robot": run.model.name,
         "seed": run.session.seed or 0,
-        "delay": run.session.delay,
-        "service": run.session.service,
-        "link_loss": run.session.link_loss,
-        "offset": run.session.offset,
         "clock_offset_s": D,
         "behind": _behind(run),
         "messages": _messages(run),
@@ -142,34 +139,31 @@ def summarize(
         "lag_user_s": None if lag is None else lag - D,
         "path": _path(run),
         "attribution_order": list(CAUSES),
-        "attribution": [_attribution(item) for item in attributions],
+        "attribution": [{**asdict(item), "parts": dict(item.parts)} for item in attributions],
         "offsets": [asdict(outcome) for outcome in offsets],
         "corrections": [
-            {
-                "t_s": made.t,
-                "end_s": made.end,
-                **in_units("error", made.error, run.model.prismatic),
-                "reason": made.reason,
-            }
+            facts(made, "t_s", "end_s", "reason") | in_units("error", made.error, run.model.prismatic)
             for made in run.corrections
         ],
         "receipts_virtual": [_receipt(receipt, run.model) for receipt in run.receipts_virtual],
         "receipts_real": [_receipt(receipt, run.model) for receipt in run.receipts_real],
         "packets": [
-            {
-                "command_id": packet.command_id,
-                "real_id": packet.real_id,
-                "sent_s": packet.sent,
-                "arrived_s": packet.arrived,
-                "lost": packet.lost,
-            }
-            for packet in run.packets
+            facts(packet, "command_id", "real_id", "sent_s", "arrived_s", "lost") for packet in run.packets
         ],
-        "events": [{"t_s": event.t, "kind": event.kind, "text": event.text} for event in run.events],
+        "events": [facts(event, "t_s", "kind", "text") for event in run.events],
     }
     rounded = _rounded(value)
     assert isinstance(rounded, dict)
     return rounded
+
+
+UNIT = re.compile(r"_((?:s|m|rad_or_m|rad|byte)(?:_per_s\d*)?)$")
+"""What a name ends with that says a unit."""
+
+
+def facts(value: object, *names: str) -> Json:
+    """Fields of a value by their names, which may say their units: `end_s` is its `end`."""
+    return {name: getattr(value, UNIT.sub("", name)) for name in names}
 
 
 def to_json(summary: Json) -> str:
@@ -230,8 +224,7 @@ def _errors(value: Agreement, model: RobotModel) -> Json:
         **in_units("joint_rms", value.joint_rms, model.prismatic),
         **in_units("joint_max", value.joint_max, model.prismatic),
         "worst_joint": worst + 1,
-        "tool_rms_m": value.tool_rms,
-        "tool_max_m": value.tool_max,
+        **facts(value, "tool_rms_m", "tool_max_m"),
         "angle_rms_deg": math.degrees(value.angle_rms),
         "angle_max_deg": math.degrees(value.angle_max),
     }
@@ -254,29 +247,12 @@ def _path(run: TwinRun) -> Json:
     return {"cell": cell, "v_max": v_max, **{name: getattr(result, name) for name in names}}
 
 
-def _attribution(item: Attribution) -> Json:
-    return {
-        "measure": item.measure,
-        "total": item.total,
-        "parts": dict(item.parts),
-        "residual": item.residual,
-    }
-
-
 def _receipt(receipt: Receipt, model: RobotModel) -> Json:
     return {
-        "command_id": receipt.command_id,
-        "status": str(receipt.status),
-        "issued_at_s": receipt.issued_at,
-        "asked_at_s": receipt.asked_at,
-        "execute_at_s": receipt.execute_at,
-        "end_s": receipt.end,
+        **facts(receipt, "command_id", "issued_at_s", "asked_at_s", "execute_at_s", "end_s", "reason", "shift_s"),
+        **facts(receipt, "shifted", "superseded", "superseded_by"),
         **in_units("q", receipt.q, model.prismatic),
-        "reason": receipt.reason,
-        "shifted": list(receipt.shifted),
-        "shift_s": receipt.shift,
-        "superseded": list(receipt.superseded),
-        "superseded_by": receipt.superseded_by,
+        "status": str(receipt.status),
     }
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
 from interfaces.link.delays import MAX_DELAY
 from interfaces.messages.recording import Begin, CommandPacket, RunEvent
-from interfaces.teleop import Correction, OperatorSite
+from interfaces.teleop import Correction, OperatorSite, VirtualArm
 from robots.robot import Robot
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
@@ -325,7 +325,7 @@ class Turn(NamedTuple):
 class RunKeeper(Protocol):
     """Writes a run down. It may listen to the operator's site."""
 
-    def begin(self, begin: Begin, operator: OperatorSite) -> None:
+    def begin(self, begin: Begin, operator: OperatorSite[VirtualArm]) -> None:
         """A run begins, set up so: nothing was commanded yet."""
 
     def turn(self, turn: Turn) -> None:

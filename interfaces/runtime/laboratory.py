@@ -13,8 +13,9 @@ import numpy as np
 from interfaces.engine_server.site import earliest
 from interfaces.link import Link, LinkConditions
 from interfaces.messages.sites import Orders, Report
+from interfaces.teleop.following_arm import FollowingArm, JointReference
 from interfaces.teleop.operator import OperatorSite
-from interfaces.teleop.robot import JointReference, RobotSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from robots.onboard.playout import PlayState
 from robots.robot import ArmBody
 from vrs.commands import finite
@@ -84,8 +85,8 @@ class Laboratory:
 
     def __init__(
         self,
-        operator: OperatorSite,
-        robot: RobotSite,
+        operator: OperatorSite[VirtualArm],
+        robot: FollowingArm,
         conditions: LinkConditions,
         rng: np.random.Generator,
         *,

@@ -34,7 +34,7 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.system import module_process
 from interfaces.teleop import JointReference, RobotHost
-from robots.robot import EXACT, Robot
+from robots.robot import IDEAL, Robot
 from vrs.checks import number_in, validated, within
 from vrs.clock import WallClock
 from vrs.commands import finite_array
@@ -68,7 +68,7 @@ class PhysicsConfig:
     """Which body, and where it stands."""
 
     robot: Robot
-    """Whose; found by `robots.load`, unless the body is exact."""
+    """Whose; found by `robots.load`, unless the body is ideal."""
     q: Array
     """Where it stands [rad], of prismatic joints [m], (n,), within the limits."""
     body: str = ""
@@ -83,9 +83,8 @@ class PhysicsConfig:
         q = finite_array("q", self.q, (limits.dof,), f"finite joint values [rad], shape ({limits.dof},)")
         limits.check(q, self.robot.arm.prismatic)
         object.__setattr__(self, "q", q)
-        object.__setattr__(self, "body", self.body or self.robot.usual_body)
-        self.robot.body(self.body)
-        if self.body != EXACT and not self.robot.found_by:
+        object.__setattr__(self, "body", self.robot.body_name(self.body))
+        if self.body != IDEAL and not self.robot.found_by:
             raise InvalidValueError("robot", self.robot.name, "one that robots.load finds, as its process does")
         if isinstance(self.every, bool) or not isinstance(self.every, int):
             raise InvalidValueError("every", self.every, "a whole number in [1, 1000]")

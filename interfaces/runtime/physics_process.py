@@ -24,7 +24,7 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.runtime.tick_loop import Moved, TickBody, TickLoop
 from interfaces.system import hasten
-from robots.robot import EXACT, ArmBody, Prepared, exact_arm, load
+from robots.robot import IDEAL, ArmBody, Prepared, exact_arm, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError
 from vrs.model import Array
@@ -67,7 +67,7 @@ class BodyTicks:
 @contextmanager
 def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
     """Make the body that the parent wants."""
-    make = exact_arm if setup.body == EXACT else load(setup.robot).body(setup.body)
+    make = exact_arm if setup.body == IDEAL else load(setup.robot).body(setup.body)
     with make(setup.q, friction=setup.friction, dt=setup.tick) as arm:
         yield BodyTicks(arm)
 

@@ -35,7 +35,7 @@ from interfaces.runs.twin_run import (
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.system import software
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots.robot import ArmBody, Robot, exact_arm
 from vrs import Lateness, Receipt, Status
 from vrs.model import Array
@@ -92,9 +92,9 @@ class TwinSession:
         """
         model = robot.arm
         self._start, self._robot, self._offset, self._body = start, robot, offset, body
-        self.operator = OperatorSite(model, start, now=0.0, lateness=Lateness.POSTPONE)
+        self.operator = OperatorSite(VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE))
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
-        self._site = RobotSite(model, start, now=0.0, config=config)
+        self._site = FollowingArm(model, start, now=0.0, config=config)
         self.lab = Laboratory(
             self.operator, self._site, conditions, np.random.default_rng(seed),
             tick=TICK, every=round(STEP / TICK), body=body,
@@ -147,7 +147,7 @@ class TwinSession:
             lab.run(lab.now + TURN)
             self._take_down()
             progress(lab.now)
-            rest = max(self.last_action, self._handled, self.operator.engine.timeline.end)
+            rest = max(self.last_action, self._handled, self.operator.robot.engine.timeline.end)
             arrived = self._robot_rests() if lab.now >= rest else None
             if arrived is not None and self._agree(arrived):
                 rest = max(rest, arrived)
@@ -164,7 +164,7 @@ class TwinSession:
 
     def _take_down(self) -> None:
         """Note what has happened since the last time, and have it written down."""
-        lab, corrections = self.lab, self.operator.corrections
+        lab, corrections = self.lab, self.operator.robot.corrections
         there, back = lab.link.forward.log.take(), lab.link.backward.log.take()
         self._messages += there
         self._lost |= {m.sent for m in there if m.lost is not None or m.attempts > 1}
@@ -222,10 +222,10 @@ class TwinSession:
         """Write down what happened up to the end [s]."""
         rows = round(end / STEP) + 1
         t, play = STEP * np.arange(rows, dtype=np.float64), self._play()[:rows]
-        shown = self.operator.engine.timeline
-        commanded = self._commanded() if self.operator.corrections else shown
+        shown = self.operator.robot.engine.timeline
+        commanded = self._commanded() if self.operator.robot.corrections else shown
         reference = np.vstack([self._start, self.lab.reference.q])[:rows]
-        corrections = tuple(self.operator.corrections)
+        corrections = tuple(self.operator.robot.corrections)
         self._settle(all_of_them=True)
         events = [*self._events, *waits(t, play, reference, slowest=1.0 - self._site.config.playout.slew)]
         arrivals = [(m.sent, math.nan if m.arrived is None else m.arrived) for m in self._messages]
@@ -239,7 +239,7 @@ class TwinSession:
             q_matched=commanded.sample(play),
             q_real=np.vstack([self._start, self.lab.measured])[:rows],
             q_reference=reference,
-            receipts_virtual=self.operator.engine.receipts,
+            receipts_virtual=self.operator.robot.engine.receipts,
             receipts_real=self._receipts(),
             packets=tuple(packet for packet in self._packets if packet is not None),
             messages=np.array(arrivals, dtype=np.float64).reshape(-1, 2),
@@ -333,7 +333,7 @@ def run_twins(
 
 
 def _register(session: TwinSession, item: PlannedMotion, now: float) -> None:
-    receipt = session.operator.execute(item.command, now=now)
+    receipt = session.operator.robot.execute(item.command, now=now)
     # What the virtual robot refused isn't sent.
     if isinstance(receipt, Receipt) and receipt.status is not Status.REJECTED:
         session.sent(now, item.command, receipt)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from interfaces.station.panels import Offer
+from robots.robot import Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -74,18 +76,20 @@ def _exp(screw: Array, q: float) -> Array:
     return X
 
 
-def described(model: RobotModel, tool: Array) -> dict[str, Any]:
-    """What a page needs to know of a robot: its chain, and the point that is drawn and dragged.
+def described(robot: Robot) -> dict[str, Any]:
+    """What a page needs to know of a robot: of which kind its segments are, and how they're drawn.
 
     Args:
-        model: The robot.
-        tool: The tool's point in the last link's frame [m], (3,).
+        robot: Of an arm, its chain is told, and the point that is drawn and dragged.
     """
-    home, S = screws(model)
+    if robot.is_base:
+        return {"segments": Offer.ARCS, "name": robot.name}
+    home, S = screws(robot.arm)
     return {
+        "segments": Offer.POLYNOMIALS,
         "home": [X.T.ravel().tolist() for X in home],
         "screws": S.tolist(),
-        "tool": np.asarray(tool).tolist(),
-        "tool_speed": model.tool_speed,
-        "tool_turn_speed": model.tool_turn_speed,
+        "tool": list(robot.tool),
+        "tool_speed": robot.arm.tool_speed,
+        "tool_turn_speed": robot.arm.tool_turn_speed,
     }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from functools import lru_cache
 from importlib import resources
 from typing import Any, Final, get_args
@@ -20,7 +20,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Mount, Route
 
 from interfaces.station.bounds import RequestBounds
-from interfaces.station.panels import PANELS, Panel, PanelPlace
+from interfaces.station.panels import Panel, PanelPlace
 from interfaces.stream.server import HEADERS, KeptFile
 
 _TYPES: Final = {"css": "text/css", "js": "text/javascript"}
@@ -73,20 +73,13 @@ _HEAD: Final = """
 class Station:
     """The page `/` and all that belongs to it. Enter `running` in the loop that serves."""
 
-    def __init__(
-        self,
-        robot: Mapping[str, Any],
-        *,
-        panels: Iterable[Panel] = PANELS,
-    ) -> None:
+    def __init__(self, robot: Mapping[str, Any], panels: Sequence[Panel]) -> None:
         """Make the page; nobody sees it yet.
 
         Args:
-            robot: What the panels' scripts are told of it: of an arm `chain.described`, of a mobile robot that it's
-                `mobile`.
-            panels: What the page has.
+            robot: What the panels' scripts are told of it, see `chain.described`.
+            panels: What the page has, see `panels_of`.
         """
-        panels = tuple(panels)
         listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in panels]
         self._boxes = _boxes(panels)
         self._config = json.dumps({"robot": robot, "panels": listed})

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final, Literal, TypeAlias
 
 from vrs.errors import InvalidValueError
@@ -10,6 +12,21 @@ from vrs.errors import InvalidValueError
 PanelPlace: TypeAlias = Literal["header", "pane", "side", "strip", "nowhere"]
 """Where a panel stands: in the bar on top, always visible; over the 3D view; as a tab at the right; across the
 bottom; or nowhere, as a script without a place of its own."""
+
+
+class Offer(StrEnum):
+    """What a server may have, of which some panels are."""
+
+    POLYNOMIALS = "polynomials"
+    """A timeline whose segments are an arm's joints, for pages to follow."""
+    ARCS = "arcs"
+    """A mobile robot that is driven, and tells its posture."""
+    JOBS = "jobs"
+    """A robot that goes to goals and does lists of jobs by itself."""
+    CAMERA = "camera"
+    TERMINALS = "terminals"
+    """VAL-II's, for pages."""
+    RECORDINGS = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +44,8 @@ class Panel:
     place: PanelPlace
     icon: str = ""
     """Of its tab, as Material Icons name it."""
+    of: Offer | None = None
+    """What a server must have for it; None if any has it."""
 
     def __post_init__(self) -> None:
         if not self.name.isascii() or not self.name.islower() or not self.name.isalpha():
@@ -34,35 +53,34 @@ class Panel:
 
 
 PANELS: Final[tuple[Panel, ...]] = (
-    Panel("pane", "3D view", "pane"),
-    Panel("drag", "Dragging the tool", "nowhere"),
+    Panel("pane", "3D view", "pane", of=Offer.POLYNOMIALS),
+    Panel("floor", "3D view", "pane", of=Offer.ARCS),
+    Panel("drag", "Dragging the tool", "nowhere", of=Offer.POLYNOMIALS),
     Panel("link", "Connection", "header"),
     Panel("control", "Control", "header"),
     Panel("theme", "Light or dark", "header"),
     Panel("stop", "Stop", "header"),
-    Panel("jog", "Jog", "side", icon="open_with"),
-    Panel("receipts", "Receipts", "side", icon="receipt_long"),
-    Panel("plots", "Plots", "side", icon="show_chart"),
-    Panel("terminal", "Terminal", "side", icon="terminal"),
+    Panel("jog", "Jog", "side", icon="open_with", of=Offer.POLYNOMIALS),
+    Panel("drive", "Drive", "side", icon="gamepad", of=Offer.ARCS),
+    Panel("map", "Map", "side", icon="map", of=Offer.JOBS),
+    Panel("jobs", "Jobs", "side", icon="checklist", of=Offer.JOBS),
+    Panel("camera", "Camera", "side", icon="videocam", of=Offer.CAMERA),
+    Panel("receipts", "Receipts", "side", icon="receipt_long", of=Offer.POLYNOMIALS),
+    Panel("plots", "Plots", "side", icon="show_chart", of=Offer.POLYNOMIALS),
+    Panel("deviation", "Plots", "side", icon="show_chart", of=Offer.ARCS),
+    Panel("terminal", "Terminal", "side", icon="terminal", of=Offer.TERMINALS),
     Panel("network", "Link", "side", icon="network_check"),
-    Panel("record", "Record", "side", icon="fiber_manual_record"),
-    Panel("strip", "Timeline", "strip"),
+    Panel("record", "Record", "side", icon="fiber_manual_record", of=Offer.RECORDINGS),
+    Panel("strip", "Timeline", "strip", of=Offer.POLYNOMIALS),
     Panel("hints", "Hints", "nowhere"),
 )
-"""What the page has, in the order of its tabs and of the keyboard."""
+"""What pages may have, in the order of their tabs and of the keyboard."""
 
-MOBILE_PANELS: Final[tuple[Panel, ...]] = (
-    Panel("floor", "3D view", "pane"),
-    Panel("link", "Connection", "header"),
-    Panel("control", "Control", "header"),
-    Panel("theme", "Light or dark", "header"),
-    Panel("stop", "Stop", "header"),
-    Panel("drive", "Drive", "side", icon="gamepad"),
-    Panel("map", "Map", "side", icon="map"),
-    Panel("jobs", "Jobs", "side", icon="checklist"),
-    Panel("camera", "Camera", "side", icon="videocam"),
-    Panel("deviation", "Plots", "side", icon="show_chart"),
-    Panel("network", "Link", "side", icon="network_check"),
-    Panel("hints", "Hints", "nowhere"),
-)
-"""What a mobile robot's page has."""
+
+def panels_of(offers: Collection[Offer]) -> tuple[Panel, ...]:
+    """What the page of a server has.
+
+    Args:
+        offers: What the server has.
+    """
+    return tuple(panel for panel in PANELS if panel.of is None or panel.of in offers)

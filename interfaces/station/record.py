@@ -8,7 +8,6 @@ import json
 import secrets
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,7 +19,6 @@ from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import Role
 from interfaces.recording.errors import RecordingError
-from interfaces.recording.live import LiveRecording
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer
@@ -28,10 +26,12 @@ from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import Viewers
 from interfaces.stream.server import HEADERS
+from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:
-    from interfaces.runtime.live.operator import LiveOperator
+    from interfaces.recording.live import LiveRecording
+    from interfaces.runtime.live.recording import SiteRecording
 
 STATE: Final = 0.25
 """Time between two looks at the recording that is made [s]."""
@@ -55,39 +55,36 @@ class _RecordAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recordings:
-    """Joins the operator's site, the directory and the pages. Enter `running` in the loop that serves."""
+    """Joins what is recorded, the directory and the pages. Enter `running` in the loop that serves."""
 
     def __init__(
         self,
-        operator: LiveOperator,
+        recording: SiteRecording,
+        clock: Clock,
         shelf: Shelf,
         access: Access,
-        *,
-        offset: str,
-        link_loss: str,
-        failed: Callable[[str], None],
+        what: Callable[[Path], LiveRecording],
     ) -> None:
         """Wait for pages.
 
         Args:
-            operator: Whose doings are recorded.
+            recording: What is recorded of the operator's site.
+            clock: Session time.
             shelf: Where recordings are put.
             access: Who may do what: viewers look, replay and take copies, operators record.
-            offset: What a recording says of how far the robot plays behind, as it was asked for.
-            link_loss: What it says of what the robot does when messages stay away.
-            failed: Is told why a recording failed.
+            what: Says what a new recording is, into a file.
         """
-        self._operator, self._shelf, self._access = operator, shelf, access
-        self._recording = partial(LiveRecording, offset=offset, link_loss=link_loss, failed=failed, over=False)
+        self._recording, self._clock, self._shelf, self._access = recording, clock, shelf, access
+        self._what = what
 
         def allowed(token: str | None) -> bool:
             return not access.refusal(Role.VIEWER, token)
 
-        self.replays = Replays(shelf, operator.clock, allowed)
+        self.replays = Replays(shelf, clock, allowed)
         self._board = Newest(b'{"kind":"begin"}')
-        self._viewers = Viewers(self._board, None, allowed)
+        self._viewers = Viewers(self._board, allowed)
         self._looking = asyncio.Event()
-        self._asked = {role: Bucket(RATE, BURST, operator.clock.now()) for role in Role}
+        self._asked = {role: Bucket(RATE, BURST, clock.now()) for role in Role}
         self._tickets: OrderedDict[str, tuple[Path, float]] = OrderedDict()
         self.sent = 0
         """Downloads under way."""
@@ -117,12 +114,12 @@ class Recordings:
     async def _tell_state(self) -> None:
         before: str | None = None
         while True:
-            recorder, now = self._operator.recorder, None
+            recorder, now = self._recording.recorder, None
             if recorder is not None:
                 facts = recorder.health()
                 now = {
                     "name": recorder.path.name,
-                    "length": round(self._operator.clock.now() - recorder.since),
+                    "length": round(self._clock.now() - recorder.since),
                     "size": recorder.size,
                     "dropped": facts["dropped"],
                     "problem": facts["problem"],
@@ -137,7 +134,7 @@ class Recordings:
     async def _tell_list(self) -> None:
         while True:
             if self._board.readers:
-                recorder = self._operator.recorder
+                recorder = self._recording.recorder
                 growing = None if recorder is None else recorder.path.name
                 entries, more = await asyncio.to_thread(self._shelf.entries, growing)
                 items = [entry.facts() for entry in entries]
@@ -164,7 +161,7 @@ class Recordings:
             role = Role.VIEWER if ask.do == "copy" else Role.OPERATOR
             if refusal := self._access.refusal(role, shown):
                 return _said(403, refusal)
-            if not self._asked[role].take(self._operator.clock.now()):
+            if not self._asked[role].take(self._clock.now()):
                 return _said(429, "too many requests: try again in a moment")
             return JSONResponse(await self._do(ask), 200, HEADERS)
         except ClientDisconnect:
@@ -179,7 +176,7 @@ class Recordings:
             case "begin":
                 await self.begin(ask.name)
             case "end":
-                problem = await self._operator.end_recording()
+                problem = await self._recording.end()
                 return {"problem": problem}
             case "copy":
                 return {"path": f"/recordings/copy/{self._ticket(ask.name)}"}
@@ -195,23 +192,23 @@ class Recordings:
             RecordingError: If the file can't be made.
         """
         path = self._shelf.place(name)
-        await self._operator.begin_recording(self._recording(path))
+        await self._recording.begin(self._what(path))
 
     def _ticket(self, name: str) -> str:
         """A word by which a recording can be fetched once, soon; it opens nothing else."""
-        recorder = self._operator.recorder
+        recorder = self._recording.recorder
         path = self._shelf.path(name)
         if recorder is not None and recorder.path.resolve() == path.resolve():
             raise InvalidValueError("recording", name, "one that has ended: this one is being written")
         ticket = secrets.token_urlsafe(18)
-        self._tickets[ticket] = path, self._operator.clock.now() + TICKET
+        self._tickets[ticket] = path, self._clock.now() + TICKET
         while len(self._tickets) > 2 * SENT_AT_ONCE:
             self._tickets.popitem(last=False)
         return ticket
 
     async def _copy(self, request: Request) -> Response:
         path, until = self._tickets.pop(request.path_params["ticket"], (None, 0.0))
-        if path is None or self._operator.clock.now() > until:
+        if path is None or self._clock.now() > until:
             return _said(404, "not here, or not any more")
         if self.sent >= SENT_AT_ONCE:
             return _said(503, "too many downloads at once: try again")

@@ -53,7 +53,7 @@ class _SharedReplay:
         self.page: ReplayPage | None = None
         self.task: asyncio.Task[None] | None = None
         self._allowed, self._open = allowed, open_
-        self.viewers = Viewers(self.board, None, self.let_in, hear=self._hear, most_heard=MOST_HEARD)
+        self.viewers = Viewers(self.board, self.let_in, hear=self._hear, most_heard=MOST_HEARD)
         self.say("opening", "Opening…")
 
     def let_in(self, token: str | None) -> bool:
@@ -120,7 +120,7 @@ class Replays:
         except InvalidValueError as error:
             board = Newest(BEGIN)
             board.put("standing", json.dumps({"kind": "failed", "text": str(error)}).encode())
-            await Viewers(board, None, self._allowed).serve(websocket)
+            await Viewers(board, self._allowed).serve(websocket)
             return
         try:
             await replay.viewers.serve(websocket)

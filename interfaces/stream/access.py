@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from interfaces.link.proxy import Address
-from interfaces.messages.control import Role
+from interfaces.messages.control import Role, covers
 from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32
@@ -25,7 +25,6 @@ LARGEST_FILE = 4096
 """Largest token file [bytes]."""
 
 _LENGTHS = f"{SHORTEST_TOKEN} to {LONGEST_TOKEN} characters"
-_RANKS = {Role.VIEWER: 0, Role.OPERATOR: 1, Role.ADMIN: 2}
 OPEN = frozenset({Role.VIEWER, Role.OPERATOR})
 """Roles that need no token on a loopback address, as long as there is no token file."""
 
@@ -77,7 +76,7 @@ class Access:
         shown = _digest("" if token is None else token[: LONGEST_TOKEN + 1])
         for owner, digest in self._digests.items():
             same = hmac.compare_digest(digest, shown)
-            entitled |= same and _opens(owner, role)
+            entitled |= same and covers(owner, role)
         if entitled or (token is None and role in self._free):
             return ""
         return f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"
@@ -194,9 +193,3 @@ def _can_be_token(text: str) -> bool:
 
 def _digest(token: str) -> bytes:
     return hashlib.sha256(token.encode("utf-8", "replace")).digest()
-
-
-def _opens(owner: Role, role: Role) -> bool:
-    if owner is Role.SITE or role is Role.SITE:
-        return owner is role
-    return _RANKS[owner] >= _RANKS[role]

@@ -7,7 +7,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -18,8 +18,8 @@ from interfaces.link.round_trip import RoundTrip
 from interfaces.messages import Order, Outcome, Reply, Request, control
 from interfaces.messages.control import Impair, Network, Notice, Ping, Pong, ProblemCode, Role, Survey
 from interfaces.messages.fields import Epoch
-from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.stream.codec import LARGEST, Encoding, Value, decode, encode
+from interfaces.messages.mobile import MobileWelcome, TaskOrder, Tasks
+from interfaces.stream.codec import LARGEST, Encoding, News, Value, Welcomed, decode, encode
 
 FROM_SERVER = 4 * LARGEST
 """Longest message of a server that is read [bytes]."""
@@ -39,20 +39,20 @@ UNKNOWN = "unknown: the session was lost before an answer came"
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
-Asked: TypeAlias = (
-    control.Acquire
-    | control.TakeOver
-    | control.Share
-    | control.Release
-    | control.Resume
-    | Survey
-    | Impair
-    | TaskOrder
-)
+Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder
+"""What a client may wish for."""
 Ask: TypeAlias = Callable[[int], Asked]
 """Makes a wish of its number."""
 Replied: TypeAlias = control.Lease | control.Problem | Network | Tasks
 """What answers one."""
+
+_COMING = Reply | Notice | Welcomed | News
+"""What a server may say."""
+_OTHERWISE: dict[type, str] = {
+    MobileWelcome: "the mobile robot {} is driven here, not an arm; docs/protocol.md says how",
+    control.Welcome: "the arm {} is served here, not a mobile robot: use interfaces.connect",
+}
+"""Why a client doesn't stay that expects the other."""
 
 
 class Phase(enum.StrEnum):
@@ -77,12 +77,10 @@ class ClientCore:
     Where it doesn't, they are answered with the refusal `UNKNOWN`.
     """
 
-    coming: ClassVar[Any] = Reply | Notice | MobileWelcome
-    """What a server may say to it."""
-
     def __init__(
         self,
         *,
+        expects: type[Welcomed] = control.Welcome,
         role: Role = Role.OPERATOR,
         name: str = "client",
         token: str | None = None,
@@ -91,11 +89,13 @@ class ClientCore:
         """Begin without a connection.
 
         Args:
+            expects: What greets it: of an arm's server, or of a mobile robot's.
             role: What it wants to do.
             name: For people, 1 to 100 characters.
             token: What the role needs.
             encoding: How its messages are written.
         """
+        self._expects = expects
         self._hello = control.Hello(control.PROTOCOL, Role(role), name, token)
         self.encoding = Encoding(encoding)
         self.port = RemotePort()
@@ -104,12 +104,10 @@ class ClientCore:
         self.phase = Phase.LOST
         self.problem: control.Problem | None = None
         """What the server said last of a message that it couldn't take."""
-        self.welcome: control.Welcome | MobileWelcome | None = None
+        self.welcome: Welcomed | None = None
         self.lease: control.Lease | None = None
-        self.state: control.State | None = None
-        """The real robot."""
-        self.network: Network | None = None
-        """The way to the robot; told of from the first `Survey` on."""
+        self.newest: dict[type, Any] = {}
+        """What was told of the robot and the way to it, the newest of each kind of `News`."""
         self.sessions = 0
         """Sessions so far; a further one begins with nothing that was followed, and perhaps another timeline."""
         self.lapses = 0
@@ -198,17 +196,13 @@ class ClientCore:
             ProtocolError: If it's none of the protocol's; the connection is then to be given up.
         """
         raw = data.encode() if isinstance(data, str) else data
-        message = decode(raw, self.encoding, allowed=self.coming, largest=FROM_SERVER)
+        message = decode(raw, self.encoding, allowed=_COMING, largest=FROM_SERVER)
         self._heard = now
         self._take(message, now)
 
     def _take(self, message: Value, now: float) -> None:
-        """Take what a server says."""
-        if isinstance(message, control.Welcome):
+        if isinstance(message, Welcomed):
             self._begin(message, now)
-        elif isinstance(message, MobileWelcome):
-            text = f"the mobile robot {message.robot} is driven here, not an arm; docs/protocol.md says how"
-            self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
         elif isinstance(message, Ping):
             t = self.time(now)
             self._send(Pong(message.number, message.t, now if t is None else t, now if t is None else t))
@@ -218,15 +212,18 @@ class ClientCore:
             self._note(message, now)
         elif isinstance(message, control.Problem):
             self._complain(message)
-        elif isinstance(message, control.State):
-            self.state = message
-        elif isinstance(message, Network):
-            self.network = message
-            self._settle(message.answers, message)
+        elif isinstance(message, News):
+            self.newest[type(message)] = message
+            if isinstance(message, Network | Tasks):
+                self._settle(message.answers, message)
         else:
             self._hand_on(message, now)  # type: ignore[arg-type]
 
-    def _begin(self, welcome: control.Welcome | MobileWelcome, now: float) -> None:
+    def _begin(self, welcome: Welcomed, now: float) -> None:
+        if not isinstance(welcome, self._expects):
+            text = _OTHERWISE[type(welcome)].format(welcome.robot)
+            self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
+            return
         before, self.welcome = self.welcome, welcome
         if not welcome.resumed:
             self.sessions += 1
@@ -336,39 +333,3 @@ class ClientCore:
         if self.phase in {Phase.LOST, Phase.CLOSED}:
             return None
         return earliest(self._ping_due, self._beat_due, self._heard + SILENCE)
-
-
-class MobileCore(ClientCore):
-    """See `ClientCore`; what it's told of the robot is kept here, the newest of each kind."""
-
-    coming: ClassVar[Any] = (
-        Outcome | control.Welcome | control.Lease | Ping | Pong | control.Problem | Network
-        | MobileWelcome | Postures | Tasks | Seen | Plan
-    )  # fmt: skip
-    postures: Postures | None = None
-    """Where both robots are."""
-    tasks: Tasks | None = None
-    """What the robot does by itself."""
-    seen: Seen | None = None
-    """What it sees."""
-    plan: Plan | None = None
-    """The known map."""
-
-    def _take(self, message: Value, now: float) -> None:
-        """Take what a server says."""
-        if isinstance(message, MobileWelcome):
-            self._begin(message, now)
-        elif isinstance(message, control.Welcome):
-            text = f"the arm {message.robot} is served here, not a mobile robot: use interfaces.connect"
-            self._complain(control.Problem(ProblemCode.REFUSED, text, fatal=True))
-        elif isinstance(message, Postures):
-            self.postures = message
-        elif isinstance(message, Tasks):
-            self.tasks = message
-            self._settle(message.answers, message)
-        elif isinstance(message, Seen):
-            self.seen = message
-        elif isinstance(message, Plan):
-            self.plan = message
-        else:
-            super()._take(message, now)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.site import earliest
@@ -48,14 +48,15 @@ class ClientPart(Protocol):
         """Begin anew: the server knows nothing any more."""
 
 
-C = TypeVar("C", bound=ClientCore)
 T = TypeVar("T")
 
 
-class Line(Generic[C]):
+class Line:
     """One client's connections to a server, one after the other, for those that use it from other threads."""
 
-    def __init__(self, url: str, core: C, clock: Clock, loop: asyncio.AbstractEventLoop, timeout: float) -> None:
+    def __init__(
+        self, url: str, core: ClientCore, clock: Clock, loop: asyncio.AbstractEventLoop, timeout: float
+    ) -> None:
         """Connect, and wait until the server has said welcome.
 
         Args:

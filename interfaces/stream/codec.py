@@ -13,33 +13,26 @@ from typing import Any, TypeAlias, TypeVar, get_args
 import msgspec
 
 from interfaces import messages
-from interfaces.messages import Reply, Request, control, mobile
+from interfaces.messages import Reply, Request, control
 from interfaces.messages.control import Notice, Pong, ProblemCode, ProtocolError, Question, Role, may_send
 from interfaces.messages.drive_sites import DriveOrders, DriveReport
 from interfaces.messages.fields import Message, Party, check_normal, plain, rich, writer
+from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
 from interfaces.messages.sites import Orders, Report
 from vrs.errors import InvalidValueError
 
 LARGEST = 65_536
 """Longest message that is read unless told otherwise [B]."""
 
+Welcomed: TypeAlias = control.Welcome | MobileWelcome
+"""What greets a client: of an arm's server, of a mobile robot's."""
+News: TypeAlias = control.State | Postures | control.Network | Tasks | Seen | Plan
+"""What is told of the robot and the way to it: of each kind the newest counts."""
 Value: TypeAlias = (
-    Request
-    | Reply
-    | Question
-    | Notice
-    | mobile.MobileWelcome
-    | mobile.Postures
-    | mobile.TaskOrder
-    | mobile.Tasks
-    | mobile.Seen
-    | mobile.Plan
-    | Orders
-    | Report
-    | DriveOrders
-    | DriveReport
-)
-"""What crosses."""
+    Request | Reply | Question | Notice | Welcomed | Postures | TaskOrder | News
+    | Orders | Report | DriveOrders | DriveReport
+)  # fmt: skip
+"""What crosses, in the order in which documents and fuzzers go through it."""
 T = TypeVar("T")
 
 KINDS: tuple[type[Message], ...] = get_args(Value)

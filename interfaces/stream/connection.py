@@ -7,10 +7,10 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from types import TracebackType
-from typing import Generic, Self
+from typing import Self, TypeVar
 
 from interfaces.clients.designer import Issued
-from interfaces.clients.viewer import ShownFrame
+from interfaces.clients.viewer import ShownFrame, Viewer
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
 from interfaces.messages.control import (
@@ -23,66 +23,65 @@ from interfaces.messages.control import (
     Role,
     State,
     Survey,
-    Welcome,
 )
 from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import Forecast, JobList, ListCommand
 from interfaces.messages.mobile import MobileWelcome, Plan, Postures, Seen, TaskOrder, Tasks
-from interfaces.stream.client import Ask, ClientCore, MobileCore, Replied
-from interfaces.stream.client_socket import C, Line, UnreachableError
-from interfaces.stream.codec import Encoding
+from interfaces.stream.client import Ask, ClientCore, Phase, Replied
+from interfaces.stream.client_socket import Line, UnreachableError
+from interfaces.stream.codec import Welcomed
 from interfaces.stream.remote import RemoteDesigner, RemoteObserver, RemoteSupervisor, RemoteViewer
 from robots.onboard.journey import Goal
 from vrs.clock import WallClock
 from vrs.commands import DriveCommand, Stop
+from vrs.errors import InvalidValueError
+
+A = TypeVar("A", bound=Replied)
+
+ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
+"""What stands for an answer of another kind than was asked for."""
 
 
-class RobotConnection(Generic[C]):
-    """A robot that a server serves. A context manager: at its end everything is closed.
+class Connection:
+    """A robot that a server serves: an arm, or a mobile robot that's driven, sent to goals, and does jobs.
 
-    Lost connections are taken up again by themselves. Calls may come from any thread.
+    A context manager: at its end everything is closed. Lost connections are taken up again by themselves. Calls may
+    come from any thread. What a robot of the other kind does is refused as the server answers it.
     """
 
-    def __init__(
-        self,
-        make: Callable[..., C],
-        url: str,
-        *,
-        role: Role = Role.OPERATOR,
-        token: str | None = None,
-        name: str = "client",
-        encoding: Encoding = Encoding.MSGPACK,
-        timeout: float = 5.0,
-    ) -> None:
+    def __init__(self, url: str, client: Callable[..., ClientCore], *, role: Role, timeout: float) -> None:
         """Connect; see `interfaces.connect`.
 
         Args:
-            make: Makes the client.
-            url: See there, as all that follows.
+            url: See there.
+            client: Makes a client of a role, which speaks for all that this is.
             role: What to do.
-            token: What the role needs.
-            name: For people.
-            encoding: How messages are written.
             timeout: How long to wait for the first answer [s].
+
+        Raises:
+            UnreachableError: If there's no answer, or the server refuses.
         """
-        self._make = make
-        self._url, self._token, self._name, self._encoding = _address(url), token, name, encoding
-        self._timeout = timeout
+        self._url, self._client, self._timeout = _address(url), client, timeout
         self._clock = WallClock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="vrs-client", daemon=True)
         self._thread.start()
-        self._sessions: list[Line[C]] = []
+        self._sessions: list[Line] = []
         try:
-            self._session = self._open(Role(role))
+            self._session = self._open(role)
         except UnreachableError:
             self._end_thread()
             raise
+        self.designer = RemoteDesigner(self._session)
+        """Issues commands; they need the lease."""
+        self.observer = RemoteObserver(self._session)
+        """Asks for positions."""
+        self.supervisor = RemoteSupervisor(self.designer, self.observer)
+        """Both."""
 
-    def _open(self, role: Role) -> Line[C]:
-        core = self._make(role=role, name=self._name, token=self._token, encoding=self._encoding)
-        self._sessions.append(Line(self._url, core, self._clock, self._loop, self._timeout))
+    def _open(self, role: Role) -> Line:
+        self._sessions.append(Line(self._url, self._client(role=role), self._clock, self._loop, self._timeout))
         return self._sessions[-1]
 
     def __enter__(self) -> Self:
@@ -107,10 +106,34 @@ class RobotConnection(Generic[C]):
         self._thread.join(timeout=5.0)
         self._loop.close()
 
-    def _end(self, session: Line[C]) -> None:
+    def _end(self, session: Line) -> None:
         session.close()
         if session in self._sessions:
             self._sessions.remove(session)
+
+    def viewer(
+        self,
+        *,
+        rate: float = 50.0,
+        form: ViewForm = ViewForm.SEGMENTS,
+        delay: float = 0.0,
+        show: Callable[[ShownFrame], None] | None = None,
+    ) -> RemoteViewer:
+        """A viewer, on a connection of its own.
+
+        Args:
+            rate: Frames to show a second, 0.1 to 1000.
+            form: What crosses.
+            delay: How long compact frames may wait for others that go in the same message [s], 0 to 0.1.
+            show: Is called with each frame, in another thread: to be quick.
+
+        Raises:
+            UnreachableError: If the connection doesn't come about.
+            InvalidValueError: If rate is out of range.
+        """
+        session = self._open(Role.VIEWER)
+        make = partial(Viewer, rate=rate, form=ViewForm(form), delay=delay)
+        return RemoteViewer(session, make, partial(self._end, session), show)
 
     def acquire(self, *, wait: float = 5.0) -> Lease | Problem:
         """Ask for the lease; it's kept by itself until it's released.
@@ -121,7 +144,7 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease, `yours` if it was given; or why not.
         """
-        return _of_lease(self._wish(control.Acquire, wait))
+        return self._ask(Lease, control.Acquire, wait)
 
     def take_over(self, *, wait: float = 5.0) -> Lease | Problem:
         """Take the lease from whoever has it: for an admin. Waits until the robot has stopped.
@@ -132,7 +155,7 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease as it's then, `yours` if it was given; or why not.
         """
-        answer = _of_lease(self._wish(control.TakeOver, wait))
+        answer = self._ask(Lease, control.TakeOver, wait)
         if isinstance(answer, Lease) and not answer.yours:
             self._session.wait(lambda: self._session.core.epoch > 0, wait)
             return self.lease or answer
@@ -150,31 +173,19 @@ class RobotConnection(Generic[C]):
         Returns:
             The lease, `shared` if it is; or why not.
         """
-        return _of_lease(self._wish(lambda number: control.Share(number, session), wait))
-
-    def ask_to_share(self, session: str) -> int:
-        """As `share`, without waiting; the number for `answer`."""
-        core = self._session.core
-        return self._session.do(
-            lambda _: core.wish(lambda number: control.Share(number, session), now=self._clock.now())
-        )
-
-    def answer(self, number: int) -> Lease | Problem | None:
-        """What the server answered to `ask_to_share`; None while it hasn't."""
-        answer = self._session.core.answer(number)
-        return None if answer is None else _of_lease(answer)
+        return self._ask(Lease, lambda number: control.Share(number, session), wait)
 
     def release(self, *, wait: float = 5.0) -> Lease | Problem:
         """Give the lease back, and the robot stops; or the share, without a stop."""
-        return _of_lease(self._wish(lambda number: control.Release(number, self._epoch), wait, leased=True))
+        return self._ask(Lease, lambda number: control.Release(number, self._epoch), wait, leased=True)
 
     def resume(self, *, wait: float = 5.0) -> Lease | Problem:
         """Let the robot go on after it stopped by itself."""
-        return _of_lease(self._wish(lambda number: control.Resume(number, self._epoch), wait, leased=True))
+        return self._ask(Lease, lambda number: control.Resume(number, self._epoch), wait, leased=True)
 
     def survey(self, *, wait: float = 5.0) -> Network | Problem:
         """Ask how the emulated way to the robot is, and what was measured of it."""
-        return _of_network(self._wish(Survey, wait))
+        return self._ask(Network, Survey, wait)
 
     def impair(
         self, forward: DirectionConditions | None, backward: DirectionConditions | None, *, wait: float = 5.0
@@ -189,20 +200,90 @@ class RobotConnection(Generic[C]):
         Returns:
             The way as it is then; or why not.
         """
-        return _of_network(
-            self._wish(lambda number: Impair(number, self._epoch, forward, backward), wait, leased=True)
-        )
+        return self._ask(Network, lambda number: Impair(number, self._epoch, forward, backward), wait, leased=True)
+
+    def drive(self, v: float, w: float, *, wait: float = 0.0) -> Issued:
+        """Drive for a moment; who doesn't say so again stops. It ends what the robot does by itself.
+
+        Args:
+            v: Linear speed [m/s].
+            w: Angular speed [rad/s].
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            What is known of it; a `refusal` says why it isn't carried out.
+
+        Raises:
+            InvalidValueError: If the robot is an arm.
+        """
+        welcome = self.welcome
+        if not isinstance(welcome, MobileWelcome):
+            raise InvalidValueError("robot", welcome.robot, "a mobile robot: nothing else is driven")
+        return self.designer.issue(DriveCommand(v, w, welcome.holds), wait=wait)
+
+    def stop(self, *, wait: float = 0.0) -> Issued:
+        """Stop both robots, and what a mobile one does by itself."""
+        return self.designer.issue(Stop(), wait=wait)
+
+    def go(self, goal: Goal, *, wait: float = 5.0) -> Tasks | Problem:
+        """Send the robot to a goal.
+
+        Args:
+            goal: Where to.
+            wait: How long to wait for the answer, not for the robot [s].
+
+        Returns:
+            What it does then; or why not.
+        """
+        return self._order(RobotTask(go=goal), wait)
+
+    def load(self, jobs: JobList, *, wait: float = 5.0) -> Tasks | Problem:
+        """Put a list of jobs in the place of the one that's there; see `go`."""
+        return self._order(RobotTask(jobs=jobs), wait)
+
+    def do(self, command: ListCommand, *, wait: float = 5.0) -> Tasks | Problem:
+        """Run, pause, resume or abort the list, or press the key; see `go`."""
+        return self._order(RobotTask(do=command), wait)
+
+    def dry_run(self, *, wait: float = 30.0) -> Forecast | Problem:
+        """Ask how long the list is likely to take; the virtual robot alone tries it."""
+        answer = self._order(RobotTask(do=ListCommand.DRY_RUN), wait)
+        if isinstance(answer, Problem):
+            return answer
+        self.wait(lambda _: self.tasks is not None and self.tasks.forecast is not None, wait)
+        tasks = self.tasks
+        if tasks is None or tasks.forecast is None:
+            return Problem(ProblemCode.STOPPING, f"no forecast within {wait:g} s")
+        return tasks.forecast
+
+    def finished(self, timeout: float) -> bool:
+        """Wait until the robot does nothing by itself any more, or the time [s] is over; whether that's so."""
+        return self.wait(lambda _: self.tasks is not None and self.tasks.doing is Doing.NOTHING, timeout)
+
+    def _order(self, task: RobotTask, wait: float) -> Tasks | Problem:
+        return self._ask(Tasks, lambda number: TaskOrder(number, task, self._epoch), wait, leased=True)
 
     @property
     def _epoch(self) -> Epoch:
         return Epoch(self._session.core.epoch)
 
-    def _wish(self, ask: Ask, wait: float, *, leased: bool = False) -> Replied:
+    def ask(self, ask: Ask, *, leased: bool = False) -> int:
+        """Ask something of the lease without waiting for the answer; the number of what was asked.
+
+        Args:
+            ask: Makes the message, of its number.
+            leased: Whether only who has the lease may ask that.
+        """
         core = self._session.core
-        number = self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+        return self._session.do(lambda _: core.wish(ask, now=self._clock.now(), leased=leased))
+
+    def _ask(self, kind: type[A], ask: Ask, wait: float, *, leased: bool = False) -> A | Problem:
+        """What the server answers to a wish, of a kind, or why not; see `ClientCore.wish`."""
+        core = self._session.core
+        number = self.ask(ask, leased=leased)
         self._session.wait(lambda: core.answer(number) is not None, wait)
         missing = Problem(ProblemCode.STOPPING, f"no answer within {wait:g} s", number)
-        return core.answer(number) or missing
+        return _expected(kind, core.answer(number) or missing)
 
     def now(self) -> float:
         """Session time [s]: that of all stamps and positions."""
@@ -229,23 +310,47 @@ class RobotConnection(Generic[C]):
     @property
     def is_connected(self) -> bool:
         """Whether there's a connection just now."""
-        return self._session.core.phase is self._session.core.phase.OPEN
+        return self._session.core.phase is Phase.OPEN
 
     def wait(self, ready: Callable[[Self], bool], timeout: float = 5.0) -> bool:
         """Wait until something is so of this connection, or the time [s] is over; whether it is."""
         return self._session.wait(lambda: ready(self), timeout)
 
+    @property
+    def state(self) -> State | None:
+        """The real arm as it was last heard of; None before that."""
+        return self._session.core.newest.get(State)
 
-def _of_lease(answer: Replied) -> Lease | Problem:
-    return answer if isinstance(answer, Lease | Problem) else ELSE
+    @property
+    def postures(self) -> Postures | None:
+        """Where both mobile robots are; None before that was told."""
+        return self._session.core.newest.get(Postures)
+
+    @property
+    def tasks(self) -> Tasks | None:
+        """What a mobile robot does by itself; None before that was told."""
+        return self._session.core.newest.get(Tasks)
+
+    @property
+    def seen(self) -> Seen | None:
+        """What it sees; None before that was told."""
+        return self._session.core.newest.get(Seen)
+
+    @property
+    def plan(self) -> Plan | None:
+        """The known map; None before that was told."""
+        return self._session.core.newest.get(Plan)
+
+    @property
+    def welcome(self) -> Welcomed:
+        """What the server said of itself and its robot."""
+        welcome = self._session.core.welcome
+        assert welcome is not None
+        return welcome
 
 
-def _of_network(answer: Replied) -> Network | Problem:
-    return answer if isinstance(answer, Network | Problem) else ELSE
-
-
-ELSE = Problem(ProblemCode.NOT_ALLOWED, "the server answered something else")
-"""What stands for an answer of another kind than was asked for."""
+def _expected(kind: type[A], answer: Replied) -> A | Problem:
+    return answer if isinstance(answer, (kind, Problem)) else ELSE
 
 
 def _address(url: str) -> str:
@@ -254,168 +359,3 @@ def _address(url: str) -> str:
         scheme, rest = "ws", url
     scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
     return f"{scheme}://{rest}" if "/" in rest else f"{scheme}://{rest}/ws"
-
-
-class Connection(RobotConnection[ClientCore]):
-    """An arm that a server serves."""
-
-    def __init__(
-        self,
-        url: str,
-        *,
-        role: Role = Role.OPERATOR,
-        token: str | None = None,
-        name: str = "client",
-        encoding: Encoding = Encoding.MSGPACK,
-        timeout: float = 5.0,
-    ) -> None:
-        """Connect; see `interfaces.connect`."""
-        super().__init__(ClientCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
-        self.designer = RemoteDesigner(self._session)
-        """Issues commands; they need the lease."""
-        self.observer = RemoteObserver(self._session)
-        """Asks for positions."""
-        self.supervisor = RemoteSupervisor(self.designer, self.observer)
-        """Both."""
-        self._session.add(self.designer)
-        self._session.add(self.observer)
-
-    def viewer(
-        self,
-        *,
-        rate: float = 50.0,
-        form: ViewForm = ViewForm.SEGMENTS,
-        delay: float = 0.0,
-        show: Callable[[ShownFrame], None] | None = None,
-    ) -> RemoteViewer:
-        """A viewer, on a connection of its own.
-
-        Args:
-            rate: Frames to show a second, 0.1 to 1000.
-            form: What crosses.
-            delay: How long compact frames may wait for others that go in the same message [s], 0 to 0.1.
-            show: Is called with each frame, in another thread: to be quick.
-
-        Raises:
-            UnreachableError: If the connection doesn't come about.
-            InvalidValueError: If rate is out of range.
-        """
-        session = self._open(Role.VIEWER)
-        end = partial(self._end, session)
-        viewer = RemoteViewer(session, rate=rate, form=ViewForm(form), delay=delay, show=show, end=end)
-        session.add(viewer)
-        return viewer
-
-    @property
-    def state(self) -> State | None:
-        """The real robot as it was last heard of; None before that."""
-        return self._session.core.state
-
-    @property
-    def welcome(self) -> Welcome:
-        """What the server said of itself and its robot."""
-        welcome = self._session.core.welcome
-        assert isinstance(welcome, Welcome)
-        return welcome
-
-
-class MobileConnection(RobotConnection[MobileCore]):
-    """Drives a mobile robot, sends it to goals, and lets it do jobs."""
-
-    def __init__(
-        self,
-        url: str,
-        *,
-        role: Role = Role.OPERATOR,
-        token: str | None = None,
-        name: str = "client",
-        encoding: Encoding = Encoding.MSGPACK,
-        timeout: float = 5.0,
-    ) -> None:
-        """Connect; see `interfaces.connect_mobile`."""
-        super().__init__(MobileCore, url, role=role, token=token, name=name, encoding=encoding, timeout=timeout)
-        self._designer = RemoteDesigner(self._session)
-        self._session.add(self._designer)
-
-    def drive(self, v: float, w: float, *, wait: float = 0.0) -> Issued:
-        """Drive for a moment; who doesn't say so again stops. It ends what the robot does by itself.
-
-        Args:
-            v: Linear speed [m/s].
-            w: Angular speed [rad/s].
-            wait: How long to wait for the answer [s].
-
-        Returns:
-            What is known of it; a `refusal` says why it isn't carried out.
-        """
-        return self._designer.issue(DriveCommand(v, w, self.welcome.holds), wait=wait)
-
-    def stop(self, *, wait: float = 0.0) -> Issued:
-        """Stop both robots, and what the real one does by itself."""
-        return self._designer.issue(Stop(), wait=wait)
-
-    def go(self, goal: Goal, *, wait: float = 5.0) -> Tasks | Problem:
-        """Send the robot to a goal.
-
-        Args:
-            goal: Where to.
-            wait: How long to wait for the answer, not for the robot [s].
-
-        Returns:
-            What it does then; or why not.
-        """
-        return self._ask(RobotTask(go=goal), wait)
-
-    def load(self, jobs: JobList, *, wait: float = 5.0) -> Tasks | Problem:
-        """Put a list of jobs in the place of the one that's there; see `go`."""
-        return self._ask(RobotTask(jobs=jobs), wait)
-
-    def do(self, command: ListCommand, *, wait: float = 5.0) -> Tasks | Problem:
-        """Run, pause, resume or abort the list, or press the key; see `go`."""
-        return self._ask(RobotTask(do=command), wait)
-
-    def dry_run(self, *, wait: float = 30.0) -> Forecast | Problem:
-        """Ask how long the list is likely to take; the virtual robot alone tries it."""
-        answer = self._ask(RobotTask(do=ListCommand.DRY_RUN), wait)
-        if isinstance(answer, Problem):
-            return answer
-        self.wait(lambda _: self.tasks is not None and self.tasks.forecast is not None, wait)
-        tasks = self.tasks
-        if tasks is None or tasks.forecast is None:
-            return Problem(ProblemCode.STOPPING, f"no forecast within {wait:g} s")
-        return tasks.forecast
-
-    def finished(self, timeout: float) -> bool:
-        """Wait until the robot does nothing by itself any more, or the time [s] is over; whether that's so."""
-        return self.wait(lambda _: self.tasks is not None and self.tasks.doing is Doing.NOTHING, timeout)
-
-    def _ask(self, task: RobotTask, wait: float) -> Tasks | Problem:
-        answer: Replied = self._wish(lambda number: TaskOrder(number, task, self._epoch), wait, leased=True)
-        return answer if isinstance(answer, Tasks | Problem) else ELSE
-
-    @property
-    def postures(self) -> Postures | None:
-        """Where both robots are; None before that was told."""
-        return self._session.core.postures
-
-    @property
-    def tasks(self) -> Tasks | None:
-        """What the robot does by itself; None before that was told."""
-        return self._session.core.tasks
-
-    @property
-    def seen(self) -> Seen | None:
-        """What it sees; None before that was told."""
-        return self._session.core.seen
-
-    @property
-    def plan(self) -> Plan | None:
-        """The known map; None before that was told."""
-        return self._session.core.plan
-
-    @property
-    def welcome(self) -> MobileWelcome:
-        """What the server said of itself and its robot."""
-        welcome = self._session.core.welcome
-        assert isinstance(welcome, MobileWelcome)
-        return welcome

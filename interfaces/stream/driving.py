@@ -11,8 +11,8 @@ from interfaces.messages import Order, Outcome, Refusal, RefusalCode, Request
 from interfaces.messages.control import PROTOCOL, Problem, ProblemCode
 from interfaces.messages.mobile import MobileWelcome
 from interfaces.stream.codec import Value
-from interfaces.teleop.driving import DrivingOperator
-from interfaces.teleop.driving.operator import HOLDS
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import HOLDS, VirtualBase
 from vrs.commands import DriveCommand, Stop
 from vrs.errors import InvalidValueError
 from vrs.mobile import MobileModel
@@ -27,7 +27,7 @@ _AT_ONCE = "a live drive begins as it comes: leave out execute_at"
 class DriveSite:
     """What a hub serves of a mobile robot."""
 
-    def __init__(self, operator: DrivingOperator, model: MobileModel, *, room: str = "") -> None:
+    def __init__(self, operator: OperatorSite[VirtualBase], model: MobileModel, *, room: str = "") -> None:
         """Serve an operator's site.
 
         Args:
@@ -83,7 +83,7 @@ class DriveSite:
 class DriveServlet:
     """Carries out a client's orders once each, in their order."""
 
-    def __init__(self, operator: DrivingOperator, admit: Callable[[Order], Refusal | None]) -> None:
+    def __init__(self, operator: OperatorSite[VirtualBase], admit: Callable[[Order], Refusal | None]) -> None:
         """Serve one client of an operator's site, which may order what is admitted."""
         self._operator, self._admit = operator, admit
         self._outbox: deque[Value] = deque(maxlen=OUTBOX)
@@ -106,14 +106,14 @@ class DriveServlet:
         """Give the operator's site an order; why it isn't carried out, None if it is."""
         command = order.command
         if isinstance(command, Stop):
-            self._operator.stop()
+            self._operator.robot.stop(now=now)
             return None
         if not isinstance(command, DriveCommand):
             return Refusal(_COMMANDS)
         if command.execute_at is not None:
             return Refusal(_AT_ONCE)
         issued = now if command.issued_at is None else command.issued_at
-        why = self._operator.wish(command.v, command.w, issued_at=issued, now=now, lasts=command.duration)
+        why = self._operator.robot.wish(command.v, command.w, issued_at=issued, now=now, lasts=command.duration)
         return Refusal(why, RefusalCode.NOT_FOLLOWING) if why else None
 
     def advance(self, *, now: float) -> tuple[Value, ...]:  # noqa: ARG002 - it's a servlet's

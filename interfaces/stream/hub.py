@@ -1,41 +1,49 @@
-"""Where all clients of one robot meet: who may command, what is shown to whom, and the sessions."""
+"""Where all clients of one robot meet: who may command, what is shown to whom, and each client's connection.
+
+Both are one concept: a connection asks the hub about all that it may do, and is told by it all there is.
+"""
 
 from __future__ import annotations
 
 import base64
+import logging
 import math
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import msgspec
 
 from interfaces.engine_server.site import Site, earliest
-from interfaces.messages import control
-from interfaces.messages.control import PROTOCOL, Impair, Network, Problem, ProblemCode, Role, may_send
-from interfaces.messages.drive_sites import RobotTask
-from interfaces.messages.mobile import TaskOrder, Tasks
-from interfaces.stream.access import Access
-from interfaces.stream.codec import Encoding, SharedEncoder
-from interfaces.stream.leasing import LeasedRobot, Leasing
-from interfaces.stream.limits import Allowances, Bucket, ClientLimits
-from interfaces.stream.session import (
-    POLICY,
-    RESTART,
-    TRY_AGAIN,
-    HubSession,
-    News,
-    SessionState,
-    State,
-    Welcome,
-    Wish,
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Want, control
+from interfaces.messages.control import (
+    PROTOCOL,
+    Impair,
+    Network,
+    Ping,
+    Pong,
+    Problem,
+    ProblemCode,
+    ProtocolError,
+    Role,
+    Survey,
+    may_send,
 )
+from interfaces.messages.drive_sites import RobotTask
+from interfaces.messages.mobile import Postures, TaskOrder, Tasks
+from interfaces.stream.access import Access
+from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
+from interfaces.stream.leasing import LeasedRobot, Leasing, SessionState, Wish
+from interfaces.stream.limits import Allowance, Allowances, Bucket, ClientLimits, Outbox
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
 
 if TYPE_CHECKING:
     from interfaces.stream.driving import DriveSite
+
+POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
+"""Close codes of WebSocket (RFC 6455, and IANA's registry)."""
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
@@ -49,7 +57,18 @@ _OPEN = 4
 """So many times as many connections may be open as there may be clients: some haven't said who they are."""
 _KEPT = 16
 """One in so many places of clients is kept for those that may command."""
+_FORGIVEN = 1.0
+"""Bad messages of a client that are forgiven a second."""
+_MUTE = 1.0
+"""Time between two complaints that a client sends too fast [s]."""
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
+_SENT = sent_by(Role.ADMIN)
+"""What some client may send."""
+
+_LOG = logging.getLogger(__name__)
+
+State: TypeAlias = control.State | Postures
+"""What is known of the real robot: of an arm, of a mobile robot."""
 
 
 class ConditionError(VrsError):
@@ -103,6 +122,253 @@ class HubConfig:
             raise InvalidValueError("state_rate", self.state_rate, "0.1 to 1000 times a second")
 
 
+class HubSession:
+    """One connection. Whatever comes in, others aren't affected; what goes out is bounded."""
+
+    def __init__(self, hub: Hub, encoding: Encoding, spending: tuple[Allowance, Allowance], *, now: float) -> None:
+        """Wait for `Hello`.
+
+        Args:
+            hub: Which it's a connection of.
+            encoding: How its messages are written.
+            spending: What it may cost while it doesn't command, and while it does.
+            now: Session time [s].
+        """
+        self._spending, self._spent = spending, 0
+        self._wanted: set[Want] = set()
+        """What was asked for and is on its way."""
+        self.hub, self._limits = hub, hub.limits
+        self.encoding = encoding
+        self.seat: SessionState | None = None
+        self.closing: tuple[int, str] | None = None
+        """Close code and reason with which the connection is to be closed, when what waits is sent."""
+        self.outbox = Outbox(hub.encoder.encode, encoding, self._limits.waiting)
+        """What waits for the client."""
+        self._allowed = Bucket(self._limits.rate, self._limits.burst, now)
+        self._excess = Bucket(self._limits.excess / 10, self._limits.excess, now)
+        self._bad = Bucket(_FORGIVEN, self._limits.bad, now)
+        self._hello_until = now + self._limits.hello
+        self._quiet_until = now
+        self._lease = -1
+        """Version of the lease that the client knows."""
+        self._network: int | None = None
+        """The same of the way to the robot; None while it hasn't asked."""
+        self._news = 0
+        """The same of what all are told."""
+
+    def receive(self, data: bytes | str, *, now: float) -> None:
+        """Take a frame of the client; bytes for msgpack, text for JSON.
+
+        Args:
+            data: What has come.
+            now: Session time [s].
+        """
+        try:
+            self._hear(data, now)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """Something raised that nobody expects: this connection ends, and no other."""
+        _LOG.exception("a client's connection is closed")
+        self._wanted.clear()
+        self.close(FAILED, ProblemCode.FAILED, f"the server failed at this: {type(error).__name__}")
+
+    @property
+    def role(self) -> Role:
+        """Of a client that hasn't said hello yet, the least."""
+        return Role.VIEWER if self.seat is None else self.seat.role
+
+    @property
+    def commands(self) -> bool:
+        """Whether it has control, or shares it."""
+        return self.seat is not None and self.hub.leasing.commanding(self.seat)
+
+    def spend(self, work: float, *, now: float) -> None:
+        """Note what the messages of the client have cost.
+
+        Args:
+            work: Processor time since the last call [s]; the bytes that it's answered are known here.
+            now: Session time [s].
+        """
+        total = self.outbox.total
+        self._spending[self.commands].spend(work, total - self._spent, now=now)
+        self._spent = total
+
+    def wait(self, *, now: float) -> float:
+        """How long nothing more of the client is to be looked at [s]; 0 for at once."""
+        return 0.0 if self.closing is not None else self._spending[self.commands].wait(now=now)
+
+    def _hear(self, data: bytes | str, now: float) -> None:
+        if self.closing is not None:
+            return
+        if not self._allowed.take(now):
+            self._slow_down(now)
+            return
+        if len(data) > self._limits.size:
+            self.close(TOO_LARGE, ProblemCode.TOO_LARGE, f"at most {self._limits.size} bytes a message")
+            return
+        try:
+            if isinstance(data, str) is not (self.encoding is Encoding.JSON):
+                raise ProtocolError(ProblemCode.MALFORMED, "JSON comes as text, msgpack as bytes")
+            raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
+            # Who may send what of it in which role is for those to say who answer.
+            allowed = control.Hello if self.seat is None else _SENT
+            message = decode(raw, self.encoding, allowed=allowed, largest=self._limits.size)
+        except ProtocolError as error:
+            self._complain(Problem(error.code, error.text), now)
+            return
+        if self.seat is None:
+            self._greet(message, now)
+        else:
+            self._take(self.seat, message, now)
+
+    def _take(self, seat: SessionState, message: Value, now: float) -> None:
+        if isinstance(message, Ping):
+            self.outbox.put(Pong(message.number, message.t, now, now))
+        elif isinstance(message, Order | Ask | Follow | Want):
+            self._serve(seat, message, now)
+        elif isinstance(message, Wish):
+            answer = self.hub.leasing.wish(seat, message, now)
+            if isinstance(answer, control.Lease):
+                self._lease = self.hub.leasing.version
+            if answer is not None:
+                self.outbox.put(answer)
+        elif isinstance(message, Survey | Impair):
+            self._survey(seat, message, now)
+        elif isinstance(message, TaskOrder):
+            self.outbox.put(self.hub.task(seat, message, now))
+
+    def _survey(self, seat: SessionState, message: Survey | Impair, now: float) -> None:
+        """Tell how the way to the robot is, after it was changed where that was asked for."""
+        problem = self.hub.impair(seat, message, now) if isinstance(message, Impair) else None
+        found = None if problem is not None else self.hub.network(now, message.number)
+        if found is not None:
+            self._network = self.hub.network_version
+            self.outbox.put(found)
+        else:
+            text = "no way to a robot is emulated here"
+            self.outbox.put(problem or Problem(ProblemCode.NOT_ALLOWED, text, message.number))
+
+    def _greet(self, hello: control.Hello, now: float) -> None:
+        found = self.hub.greet(self, hello, now)
+        if isinstance(found, Problem):
+            self.close(TRY_AGAIN if found.code is ProblemCode.FULL else POLICY, found.code, found.text)
+            return
+        self.seat, welcome = found
+        self._lease = self.hub.leasing.version
+        self.outbox.put(welcome)
+
+    def _serve(self, seat: SessionState, message: Order | Ask | Follow | Want, now: float) -> None:
+        if not isinstance(message, Order):
+            if self.outbox.is_full:
+                return
+            if isinstance(message, Want):
+                if message in self._wanted:
+                    return
+                self._wanted.add(message)
+        elif not may_send(seat.role, message.sender):
+            text = "a viewer commands nothing"
+            self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
+            return
+        seat.servlet.receive(message, now=self.hub.engine_time(now))
+        self.look(now=now)
+
+    def look(self, *, now: float) -> None:
+        """Put what the servlet has into the outbox; of frames and pulses only the newest waits."""
+        seat = self.seat
+        if seat is None or self.closing is not None:
+            return
+        try:
+            for reply in seat.servlet.advance(now=self.hub.engine_time(now)):
+                if isinstance(reply, Broadcast | Pulse):
+                    self.outbox.put_newest(reply)
+                else:
+                    self.outbox.put(reply)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+            self._fail(error)
+
+    def is_due(self, now: float) -> bool:
+        """Whether `advance` has something to send, or the connection is to be closed, at now [s]."""
+        if self.outbox or self.closing is not None:
+            return True
+        if self.seat is None:
+            return now >= self._hello_until
+        hub = self.hub
+        if hub.leasing.version != self._lease or hub.news_version != self._news:
+            return True
+        if self._network is not None and hub.network_version != self._network:
+            return True
+        t = self.seat.servlet.next_deadline()
+        return t is not None and t <= hub.engine_time(now)
+
+    def advance(self, *, now: float) -> tuple[bytes, ...]:
+        """What is to be sent next, some 16 KiB at once; a transport that can't send doesn't call.
+
+        Args:
+            now: Session time [s].
+        """
+        if self.closing is None:
+            if self.seat is not None:
+                try:
+                    self._look_around(self.seat, now)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
+                    self._fail(error)
+            elif now >= self._hello_until:
+                self.close(POLICY, ProblemCode.HELLO_LATE, f"hello must come within {self._limits.hello:g} s")
+        found = self.outbox.take()
+        if not self.outbox:
+            self._wanted.clear()
+        return found
+
+    def _look_around(self, seat: SessionState, now: float) -> None:
+        hub = self.hub
+        if hub.leasing.version != self._lease:
+            self._lease = hub.leasing.version
+            self.outbox.put_newest(hub.leasing.seen_by(seat))
+        if self._network is not None and hub.network_version != self._network:
+            self._network = hub.network_version
+            found = hub.network(now)
+            if found is not None:
+                self.outbox.put_newest(found)
+        if hub.news_version != self._news:
+            for version, news in hub.news.values():
+                if version > self._news:
+                    self.outbox.put_newest(news)
+            self._news = hub.news_version
+        self.look(now=now)
+
+    def close(self, code: int, problem: ProblemCode, text: str) -> None:
+        """Close the connection, with a last word.
+
+        Args:
+            code: Close code of WebSocket.
+            problem: Why.
+            text: Why, for people.
+        """
+        if self.closing is None:
+            self.closing = code, text
+            self.outbox.put(Problem(problem, text, fatal=True))
+
+    def _complain(self, problem: Problem, now: float) -> None:
+        if self.seat is None:
+            late = problem.code is ProblemCode.NOT_ALLOWED
+            code = ProblemCode.HELLO_EXPECTED if late else problem.code
+            self.close(POLICY, code, f"the first message must be hello: {problem.text}")
+        elif self._bad.take(now):
+            self.outbox.put(problem)
+        else:
+            self.close(POLICY, problem.code, f"too many messages that can't be taken, the last one: {problem.text}")
+
+    def _slow_down(self, now: float) -> None:
+        text = f"at most {self._limits.rate:g} messages a second"
+        if not self._excess.take(now):
+            self.close(POLICY, ProblemCode.TOO_FAST, text)
+        elif now >= self._quiet_until:
+            self._quiet_until = now + _MUTE
+            self.outbox.put(Problem(ProblemCode.TOO_FAST, text))
+
+
 class Hub:
     """All sessions at one site. It's given the time, and whatever comes; shells do the sockets.
 
@@ -138,17 +404,19 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        self._leasing = Leasing(lease, robot, self.limits.sharers)
+        self.leasing = Leasing(lease, robot, self.limits.sharers)
+        """Who may command."""
         self._random = random_bytes
         if not site.broadcasters:
             for rate in self.config.rates:
                 site.broadcast(rate)
-        self.state: State | None = None
-        """The real robot, as clients are told."""
-        self._newest: State | None = None
         self._workers = workers
-        self.news: dict[type, News] = {}
-        """What every client is told when it changes, by its kind."""
+        self.news: dict[type, tuple[int, News]] = {}
+        """What every client is told when it changes, by its kind, with its version."""
+        self.news_version = 0
+        """Counts its changes."""
+        self._shown: State | None = None
+        """Of the real robot, what clients are told next."""
         self._state_due = -math.inf
         self.network_version = 0
         """Counts the changes of the way to the robot."""
@@ -159,6 +427,8 @@ class Hub:
         self._allowances = Allowances(self.limits, 0.0)
         self._surveyed: tuple[float, int, Network | None] = (-math.inf, 0, None)
         self._seats: dict[str, SessionState] = {}
+        self._served: dict[SessionState, HubSession] = {}
+        """The sessions that have a connection, with it."""
         self._edit = site.look()
         self._sweep = -math.inf
         self._now = self._t = -math.inf
@@ -176,20 +446,7 @@ class Hub:
     @property
     def lease_state(self) -> LeaseState:
         """Where the lease is."""
-        return self._leasing.state
-
-    @property
-    def lease_version(self) -> int:
-        """Counts the changes of the lease."""
-        return self._leasing.version
-
-    def lease_for(self, seat: SessionState, answers: int | None = None) -> control.Lease:
-        """The lease as a client sees it, perhaps as an answer to its request of that number."""
-        return self._leasing.seen_by(seat, answers)
-
-    def wish(self, seat: SessionState, wish: Wish, now: float) -> control.Lease | Problem | None:
-        """Do what a client asks of the lease; the answer, None for a beat that counts."""
-        return self._leasing.wish(seat, wish, now)
+        return self.leasing.lease.state
 
     def commands(self, key: str, epoch: int, *, now: float) -> bool:
         """Whether a session has the lease, in that epoch, at now [s].
@@ -200,15 +457,17 @@ class Hub:
             now: Session time [s].
         """
         seat = self._seats.get(key)
-        return seat is not None and seat.role is not Role.VIEWER and self._leasing.admits(seat, epoch, now)
+        return seat is not None and seat.role is not Role.VIEWER and self.leasing.admits(seat, epoch, now)
 
-    def commanding(self, seat: SessionState) -> bool:
-        """Whether a session has the lease, or shares it."""
-        return self._leasing.commanding(seat)
+    def let_acquire(self, key: str, *, now: float) -> None:
+        """Ask for the lease in the place of a session that has a connection."""
+        seat = self._seats.get(key)
+        if seat is not None and seat in self._served:
+            self.leasing.wish(seat, control.Acquire(1), now)
 
     def stopped(self, *, now: float) -> None:
         """Say that the robot is at rest after a lease ended, and takes no command."""
-        self._leasing.stopped(now=now)
+        self.leasing.stopped(now=now)
 
     def open(self, encoding: Encoding, *, now: float, address: str = "") -> HubSession:
         """Take a connection; with too many, one that's closed at once.
@@ -237,9 +496,10 @@ class Hub:
         self._sessions.pop(session, None)
         self._allowances.leave(self._opened.pop(session))
         seat = session.seat
-        if seat is None or seat.session is not session:
+        if seat is None:
             return
-        seat.session, seat.left = None, now
+        del self._served[seat]
+        seat.left = now
         if done or seat.role is Role.VIEWER:
             self._forget(seat)
         self._tidy(now)
@@ -247,7 +507,7 @@ class Hub:
     def _tidy(self, now: float) -> None:
         """Forget sessions that were left long ago, or too many; not that of the lease's holder."""
         absent = [
-            seat for seat in self._seats.values() if seat.session is None and seat is not self._leasing.holder
+            seat for seat in self._seats.values() if seat not in self._served and seat is not self.leasing.holder
         ]
         absent.sort(key=lambda seat: seat.left)
         surplus = len(absent) - self.limits.absent
@@ -258,15 +518,16 @@ class Hub:
     def _forget(self, seat: SessionState) -> None:
         seat.servlet.close()
         self._seats.pop(seat.key, None)
-        self._leasing.forget(seat)
+        self.leasing.forget(seat)
 
     def show(self, state: State) -> None:
-        """Take the newest that is known of the real robot."""
-        self._newest = state
+        """Tell every client the newest that is known of the real robot, no oftener than they are to be told."""
+        self._shown = state
 
     def tell(self, news: News) -> None:
         """Let every client know what there is now, in place of what was told of that kind before."""
-        self.news[type(news)] = news
+        self.news_version += 1
+        self.news[type(news)] = self.news_version, news
 
     def close(self, text: str = "the server stops") -> tuple[HubSession, ...]:
         """End every session; those that have a last word to send."""
@@ -278,10 +539,11 @@ class Hub:
         """Make the frames that are due at now [s]; the sessions whose `advance` is to be called."""
         self._now, self._sweep = now, now + SWEEP
         self._t = self.site.time(now)
-        self._leasing.turn(now)
+        self.leasing.turn(now)
         self.site.advance(now=now)
-        if self._newest is not self.state and now >= self._state_due:
-            self.state, self._state_due = self._newest, now + 1.0 / self.config.state_rate
+        if self._shown is not None and now >= self._state_due:
+            self.tell(self._shown)
+            self._shown, self._state_due = None, now + 1.0 / self.config.state_rate
         edit, before = self.site.look(), self._edit
         self._edit = edit
         if edit != before:
@@ -294,7 +556,7 @@ class Hub:
     def next_deadline(self) -> float | None:
         """When to call `advance` next [s]; None for not before something arrives."""
         sweep = self._sweep if self._sessions else None
-        return earliest(self.site.next_deadline(), self._leasing.next_deadline(), sweep)
+        return earliest(self.site.next_deadline(), self.leasing.lease.next_deadline(), sweep)
 
     def engine_time(self, now: float) -> float:
         """The engine's time [s] at the session time now [s]."""
@@ -304,7 +566,7 @@ class Hub:
 
     def greet(
         self, session: HubSession, hello: control.Hello, now: float
-    ) -> tuple[SessionState, Welcome] | Problem:
+    ) -> tuple[SessionState, Welcomed] | Problem:
         """Let a client in, or say why not; see `HubSession`."""
         if hello.protocol != PROTOCOL:
             return Problem(ProblemCode.VERSION, f"this server speaks version {PROTOCOL} of the protocol")
@@ -318,32 +580,37 @@ class Hub:
         if seat is None or not resumed:
             if full := self._full(hello.role):
                 return Problem(ProblemCode.FULL, full)
-            seat = self._seat(hello)
-        elif seat.session is not None:
-            seat.session.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
-            seat.session.seat = None
+            seat = self._seat(hello.name, hello.role)
+            self._seats[seat.key] = seat
+        elif (before := self._served.get(seat)) is not None:
+            before.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
+            before.seat = None
         welcome = self._welcome(seat, resumed, now)
-        seat.session = session
+        self._served[seat] = session
         return seat, welcome
 
     def _full(self, role: Role) -> str:
         """Why there's no place for one more; empty if there is. Who goes on with a session has its place."""
         most = self.limits.clients - (self.limits.clients // _KEPT if role is Role.VIEWER else 0)
-        if sum(seat.session is not None for seat in self._seats.values()) < most:
+        if len(self._served) < most:
             return ""
         return f"there are {most} clients already"
 
-    def _seat(self, hello: control.Hello) -> SessionState:
+    def join(self, name: str) -> SessionState:
+        """Let in a client in this process: an operator without a connection, whose lease needs no beats."""
+        return self._seat(name, Role.OPERATOR, local=True)
+
+    def _seat(self, name: str, role: Role, *, local: bool = False) -> SessionState:
         key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
-        seat = self._seats[key] = SessionState(key, hello.name, hello.role)
-        seat.servlet = self.site.servlet(admit=lambda order: self._leasing.refusal(seat, order, self._now))
+        seat = SessionState(key, name, role, local=local)
+        seat.servlet = self.site.servlet(admit=lambda order: self.leasing.refusal(seat, order, self._now))
         return seat
 
-    def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcome:
+    def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcomed:
         config = self.config
         return self.site.welcome(
-            session=seat.key, role=seat.role, now=now, lease=self.lease_for(seat), resumed=resumed,
-            instance=config.instance, server=config.server, lease_timeout=self._leasing.timeout,
+            session=seat.key, role=seat.role, now=now, lease=self.leasing.seen_by(seat), resumed=resumed,
+            instance=config.instance, server=config.server, lease_timeout=self.leasing.lease.config.timeout,
         )  # fmt: skip
 
     def network(self, now: float, answers: int | None = None) -> Network | None:
@@ -362,7 +629,7 @@ class Hub:
             return Problem(ProblemCode.NOT_ALLOWED, "no way to a robot is emulated here", wish.number)
         if not may_send(seat.role, wish.sender):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer changes nothing", wish.number)
-        if not self._leasing.admits(seat, wish.epoch, now):
+        if not self.leasing.admits(seat, wish.epoch, now):
             text = "only who has control changes the way to the robot"
             return Problem(ProblemCode.STALE_EPOCH, text, wish.number)
         if not self._changes.take(now):
@@ -383,7 +650,7 @@ class Hub:
             return Problem(ProblemCode.NOT_ALLOWED, "this robot does nothing by itself", order.number)
         if not may_send(seat.role, order.sender):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer commands nothing", order.number)
-        if not self._leasing.admits(seat, order.epoch or 0, now):
+        if not self.leasing.admits(seat, order.epoch or 0, now):
             text = "only who has control tells the robot what to do"
             return Problem(ProblemCode.STALE_EPOCH, text, order.number)
         refusal = self._workers.order(order.task, now=now)

@@ -3,13 +3,32 @@
 from __future__ import annotations
 
 import hmac
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from interfaces.messages import Order, Refusal, RefusalCode, control
-from interfaces.messages.control import OVERRULED, Problem, ProblemCode, may_send
+from interfaces.messages.control import OVERRULED, Problem, ProblemCode, Role, may_send
 from interfaces.messages.fields import Epoch
-from interfaces.stream.session import SessionState, Wish
-from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal, LeaseState
+from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal
+
+if TYPE_CHECKING:
+    from interfaces.engine_server.servlet import Servlet
+    from interfaces.stream.driving import DriveServlet
+
+
+Wish: TypeAlias = control.LeaseWish | control.Beat
+"""What a client asks of the lease, or says to keep it."""
+
+
+class SessionState:
+    """What a session keeps while its connection is lost: who it is, and its servlet."""
+
+    __slots__ = ("key", "left", "local", "name", "role", "servlet")
+
+    def __init__(self, key: str, name: str, role: Role, *, local: bool = False) -> None:
+        self.key, self.name, self.role, self.local = key, name, role, local
+        self.servlet: Servlet | DriveServlet
+        self.left = 0.0
+        """When its connection was lost [s]."""
 
 
 class LeasedRobot(Protocol):
@@ -46,7 +65,7 @@ class Leasing:
             robot: What the lease does to the robot.
             sharers: Sessions that may share it, at most.
         """
-        self._lease, self._robot, self._sharers = lease, robot, sharers
+        self.lease, self._robot, self._sharers = lease, robot, sharers
         self.version = 0
         """Counts the changes of the lease."""
         self.holder: SessionState | None = None
@@ -56,29 +75,15 @@ class Leasing:
         self._shares: dict[SessionState, bool] = {}
         """Who shares the lease in force; False once another session of it has commanded since."""
 
-    @property
-    def state(self) -> LeaseState:
-        """Where the lease is."""
-        return self._lease.state
-
-    @property
-    def timeout(self) -> float:
-        """A lease expires so long after the last beat [s]."""
-        return self._lease.config.timeout
-
-    def next_deadline(self) -> float | None:
-        """When it may end [s]."""
-        return self._lease.next_deadline()
-
     def forget(self, seat: SessionState) -> None:
         """Forget a session that's gone for good."""
         self._shares.pop(seat, None)
 
     def stopped(self, *, now: float) -> None:
         """Say that the robot is at rest after a lease ended, and takes no command."""
-        was = self._lease.state
-        grant = self._lease.stopped(now=now)
-        if self._lease.state is was:
+        was = self.lease.state
+        grant = self.lease.stopped(now=now)
+        if self.lease.state is was:
             return
         taker, self._taker = self._taker, None
         self.version += 1
@@ -93,7 +98,7 @@ class Leasing:
             if shares is None:
                 return Refusal("no lease: acquire it first")
             return Refusal(OVERRULED, RefusalCode.OVERRULED)
-        heard = self._lease.heard if seat is self.holder else self._lease.refused
+        heard = self.lease.heard if seat is self.holder else self.lease.refused
         epoch = order.epoch or 0
         if heard(epoch, now=now) is not None:
             return Refusal(f"no lease: epoch {epoch} isn't in force")
@@ -114,9 +119,9 @@ class Leasing:
         elif seat is not self.holder:
             refusal = self._of_a_share(seat, wish, now)
         elif isinstance(wish, control.Release):
-            refusal = self._lease.release(wish.epoch, now=now)
+            refusal = self.lease.release(wish.epoch, now=now)
         else:
-            refusal = self._lease.heard(wish.epoch, now=now)
+            refusal = self.lease.heard(wish.epoch, now=now)
         self.turn(now)
         if refusal is None and isinstance(wish, control.Resume):
             text = self._robot.resume(wish.epoch, now=now)
@@ -134,7 +139,7 @@ class Leasing:
 
     def admits(self, seat: SessionState, epoch: int, now: float) -> bool:
         """Whether a session has the lease, and this is its epoch."""
-        admitted = seat is self.holder and self._lease.heard(epoch, now=now) is None
+        admitted = seat is self.holder and self.lease.heard(epoch, now=now) is None
         self.turn(now)
         return admitted
 
@@ -146,7 +151,7 @@ class Leasing:
             return LeaseRefusal.NOT_ADMIN
         if seat is self.holder:
             return None
-        lease, name = self._lease, seat.name
+        lease, name = self.lease, seat.name
         answer = lease.take_over(name, admin=admin, now=now) if force else lease.acquire(name, now=now)
         if isinstance(answer, LeaseRefusal):
             return answer
@@ -178,15 +183,18 @@ class Leasing:
         assert isinstance(wish, control.Release | control.Resume | control.Beat)
         if not self._shares.get(seat) or isinstance(wish, control.Beat):
             return LeaseRefusal.STALE_EPOCH
-        refusal = self._lease.refused(wish.epoch, now=now)
+        refusal = self.lease.refused(wish.epoch, now=now)
         if refusal is None and isinstance(wish, control.Release):
             del self._shares[seat]
             self.version += 1
         return refusal
 
     def turn(self, now: float) -> None:
-        """Stop the robot if the lease has ended."""
-        ended = self._lease.advance(now=now)
+        """Stop the robot if the lease has ended; that of a holder in this process needs no beats."""
+        epoch = self.lease.epoch
+        if self.holder is not None and self.holder.local and epoch is not None:
+            self.lease.heard(epoch, now=now)
+        ended = self.lease.advance(now=now)
         if ended is not None:
             self.holder, self._ended = None, ended.why
             self._shares.clear()
@@ -195,6 +203,6 @@ class Leasing:
 
     def seen_by(self, seat: SessionState, answers: int | None = None) -> control.Lease:
         """The lease as a client sees it: its epoch is told to its holder only, and to who shares it."""
-        lease, yours, shared = self._lease, seat is self.holder, self._shares.get(seat, False)
+        lease, yours, shared = self.lease, seat is self.holder, self._shares.get(seat, False)
         epoch = Epoch(lease.epoch) if lease.epoch and (yours or shared) else None
         return control.Lease(lease.state, epoch, lease.holder, yours, answers, self._ended, shared)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any
 
 from interfaces.clients.designer import Designer, Issued
 from interfaces.clients.observer import Observation, Observer
 from interfaces.clients.playhead import Mode
+from interfaces.clients.ports import RemotePort
 from interfaces.clients.viewer import ShownFrame, Viewer
-from interfaces.messages import Scene, ViewForm
+from interfaces.messages import Scene
 from interfaces.stream.client_socket import Line
 from vrs.commands import Command
 from vrs.timeline import Timeline
@@ -19,9 +18,10 @@ from vrs.timeline import Timeline
 class RemoteDesigner:
     """A `Designer` under a lock. Commands that have no answer when a session is lost are refused as unknown."""
 
-    def __init__(self, session: Line[Any]) -> None:
+    def __init__(self, session: Line) -> None:
         self._session = session
         self._designer = Designer(session.port)
+        session.add(self)
 
     def issue(self, command: Command, *, execute_in: float | None = None, wait: float = 0.0) -> Issued:
         """Issue a command.
@@ -82,9 +82,10 @@ class RemoteDesigner:
 class RemoteObserver:
     """An `Observer` under a lock."""
 
-    def __init__(self, session: Line[Any]) -> None:
+    def __init__(self, session: Line) -> None:
         self._session = session
         self._observer = Observer(session.port)
+        session.add(self)
 
     def ask(self, t: float | None = None, *, wait: float = 5.0) -> Observation | None:
         """Ask for the position, and wait for the answer.
@@ -145,28 +146,22 @@ class RemoteViewer:
 
     def __init__(
         self,
-        session: Line[Any],
-        *,
-        rate: float,
-        form: ViewForm,
-        delay: float,
+        session: Line,
+        make: Callable[[RemotePort], Viewer],
         end: Callable[[], None],
         show: Callable[[ShownFrame], None] | None = None,
     ) -> None:
-        """Follow; see `Viewer`.
+        """Follow.
 
         Args:
             session: Its connection.
-            rate: Frames a second.
-            form: What crosses.
-            delay: How long compact frames may wait for others [s].
+            make: Makes the viewer of a port, in the beginning and for each further session.
             end: Closes the connection.
             show: Is called with each frame, in the connection's thread and under its lock: to be quick.
         """
-        self._end = end
-        self._session, self._show = session, show
-        self._make = partial(Viewer, rate=rate, form=form, delay=delay)
-        self._viewer = self._make(session.port)
+        self._session, self._make, self._end, self._show = session, make, end, show
+        self._viewer = make(session.port)
+        session.add(self)
 
     @property
     def newest(self) -> ShownFrame | None:

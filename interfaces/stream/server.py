@@ -23,8 +23,7 @@ from websockets.frames import Opcode
 from interfaces.messages.control import Role
 from interfaces.stream.access import check_host, check_origin
 from interfaces.stream.codec import Encoding
-from interfaces.stream.hub import Hub
-from interfaces.stream.session import HubSession
+from interfaces.stream.hub import Hub, HubSession
 from interfaces.stream.sockets import BoundedWebSocket
 from interfaces.timer import Turning
 from vrs.clock import Clock
@@ -239,7 +238,7 @@ class HubServer:
         session, socket = client.session, client.socket
         opcode = Opcode.BINARY if session.encoding is Encoding.MSGPACK else Opcode.TEXT
         with contextlib.suppress(OSError):
-            while session.closing is None or session.has_more:
+            while session.closing is None or session.outbox:
                 await client.wake.wait()
                 client.wake.clear()
                 more = True
@@ -247,7 +246,7 @@ class HubServer:
                     for data in session.advance(now=self._now):
                         client.blocked_since = self._now
                         await socket.put(data, opcode)
-                    more = session.has_more
+                    more = bool(session.outbox)
                 client.blocked_since = None
             assert session.closing is not None
             code, reason = session.closing

@@ -1,25 +1,20 @@
 """Both sites of a teleoperated robot: messages, the operator's, the robot's."""
 
-from interfaces.teleop.operator import (
-    Correction,
-    OperatorSite,
-    OperatorSiteConfig,
-    RobotLine,
-    SiteObserver,
-)
-from interfaces.teleop.robot import (
-    AdaptiveOffset,
+from interfaces.teleop.following_arm import (
+    FollowingArm,
     JointReference,
-    OffsetConfig,
     RobotHost,
     RobotHostConfig,
-    RobotSite,
     RobotSiteConfig,
 )
+from interfaces.teleop.operator import Correction, OperatorSite, SiteObserver, VirtualRobot
+from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig, RobotSite
+from interfaces.teleop.virtual_arm import OperatorSiteConfig, RobotLine, VirtualArm
 
 __all__ = [
     "AdaptiveOffset",
     "Correction",
+    "FollowingArm",
     "JointReference",
     "OffsetConfig",
     "OperatorSite",
@@ -30,4 +25,6 @@ __all__ = [
     "RobotSite",
     "RobotSiteConfig",
     "SiteObserver",
+    "VirtualArm",
+    "VirtualRobot",
 ]  # fmt: skip

@@ -14,7 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -24,21 +24,11 @@ from interfaces.link.clock_sync import ClockSync
 from interfaces.link.packets import PacketRecord
 from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEstimator
 from interfaces.messages.control import Ping, Pong
-from robots.onboard import LossPolicy, Verdict, WatchdogConfig
+from interfaces.teleop.robot import O, R, RobotSite
+from robots.onboard import LossPolicy, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 
-
-class Epochal(Protocol):
-    """A message of an operator's site."""
-
-    @property
-    def epoch(self) -> int:
-        """Of the operator's."""
-
-
-O = TypeVar("O", bound=Epochal)  # noqa: E741 - orders
-R = TypeVar("R")
 O_co = TypeVar("O_co", covariant=True)
 R_contra = TypeVar("R_contra", contravariant=True)
 
@@ -146,39 +136,11 @@ MET = "the robot's site has just met this operator's"
 """Why a robot halts that is met."""
 OTHER = "another operator's site came"
 """Why a robot halts whose operator hasn't been heard while another came."""
-LOST = "nothing fresh came from the operator: link loss"
-"""Why a robot halts that has lost its operator."""
 _LIMIT = 16
 """Messages that wait for the clocks to be compared."""
 
 
-O_contra = TypeVar("O_contra", contravariant=True)
-R_co = TypeVar("R_co", covariant=True)
-
-
-class OrderExecutor(Protocol[O_contra, R_co]):
-    """A robot's site: what carries out the orders of one operator. Times are the operator's [s]."""
-
-    def join(self, orders: O_contra, reason: str, *, now: float) -> None:
-        """Meet an operator in the midst of the epoch of these orders: wait for the next one."""
-
-    def receive(self, orders: O_contra, *, now: float, correction: float, uncertainty: float) -> None:
-        """Take in orders; what they were stamped is to be corrected, and the clocks are so uncertain [s]."""
-
-    def advance(self, *, now: float) -> tuple[R_co, ...]:
-        """Do what is due, and say what is to be sent."""
-
-    def next_deadline(self) -> float:
-        """When there's something to do."""
-
-    def rests(self, *, now: float) -> bool:
-        """Whether the robot is to stand still."""
-
-    def halt(self, reason: str, *, now: float) -> None:
-        """Stop, and wait for a new epoch."""
-
-
-E = TypeVar("E", bound=OrderExecutor)  # type: ignore[type-arg]
+E = TypeVar("E", bound=RobotSite[Any, Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,18 +355,3 @@ class Host(Generic[E, O, R]):
         """Bound on the error of what is taken for the operator's clock [s]; infinite if nothing is known."""
         estimate = self._sync.estimate(self._now)
         return math.inf if estimate is None else estimate.uncertainty
-
-
-def lost(watchdog: WatchdogConfig, verdict: Verdict) -> str:
-    """Why a robot halts that has lost its operator, and what mends it.
-
-    Args:
-        watchdog: By which it has.
-        verdict: What became of the newest message.
-    """
-    mend = "on a link this slow start vrs serve with --link-loss hold"
-    if verdict.counts:
-        return f"{LOST} ({mend})"
-    if verdict is Verdict.TOO_OLD:
-        mend = f"{watchdog.max_age:g} s are allowed: {mend}, or vrs robot with a larger --max-age"
-    return f"{LOST} (the newest message was refused: {verdict}; {mend})"

@@ -1,46 +1,213 @@
-"""The robot's site: an engine of its own, played out under jitter, and reports to the operator.
+"""The robot's site: which orders of the operator count, and when it has lost him.
 
-With an adaptive offset the engine is a replica: it carries out the operator's log in its order, each entry as of
-the time at which it was given, and so has the operator's timeline to the bit; how late messages come is a matter
-of the playout alone. With a fixed offset D, as in the paper, entries are carried out as they come, at the time that
-the robot's own clock then reads; late ones are postponed, and the timelines part.
+What's done with orders that count differs between arms and bases: `FollowingArm`, `FollowingBase`.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from itertools import chain, islice
-from typing import Annotated, NamedTuple, cast
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Generic, Protocol, TypeVar
 
-import numpy as np
-from typing_extensions import override
-
-from interfaces.engine_server.site import engine_time
 from interfaces.link.delays import share_of
-from interfaces.link.delivery import Incoming
 from interfaces.link.round_trip import RelativeDelays, WindowConfig
-from interfaces.messages.fields import Epoch
-from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
-from interfaces.teleop.connection import Host, HostConfig, lost
-from interfaces.teleop.samples import SampleLog
-from robots.onboard.following import SensorMonitor, Violation, too_far
-from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
-from robots.onboard.servo import from_commanded
 from robots.onboard.watchdog import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import validated, within
-from vrs.clock import ManualClock
-from vrs.commands import Profile, finite
-from vrs.engine import Engine
-from vrs.errors import VrsError
-from vrs.insertion import hold, piece
-from vrs.ledger import Receipt, Status
-from vrs.model import Array, RobotModel
-from vrs.planning.jerk_limited import stop
-from vrs.segment import HOLD, State
-from vrs.timeline import Timeline
+
+
+class SiteOrders(Protocol):
+    """A message of an operator's site, to any kind of robot."""
+
+    @property
+    def epoch(self) -> int:
+        """Of the operator's."""
+
+    @property
+    def number(self) -> int:
+        """It rises from message to message."""
+
+    @property
+    def sent_at(self) -> float:
+        """By the operator's clock [s]."""
+
+
+O = TypeVar("O", bound=SiteOrders)  # noqa: E741 - orders
+R = TypeVar("R")
+
+LOST = "nothing fresh came from the operator: link loss"
+"""Why a robot halts that has lost its operator."""
+
+
+class RobotSite(ABC, Generic[O, R]):
+    """Carries out the orders of one operator, as far as a watchdog lets them count.
+
+    Times are by its clock, as the robot takes the operator's to be [s].
+    """
+
+    rearms: ClassVar[bool]
+    """Whether an epoch may follow another one without a halt between them."""
+
+    def __init__(self, watchdog: WatchdogConfig | None, beat: float, *, now: float, reported: int) -> None:
+        """Wait for an epoch.
+
+        Args:
+            watchdog: When the link counts as lost; None: no message is too old.
+            beat: Time between two reports [s].
+            now: [s].
+            reported: Number of the newest report of an earlier life, which the operator may know.
+        """
+        self.epoch = 0
+        """That it follows; 0 before the first."""
+        self.halted = ""
+        """Why it stopped by itself; empty while it follows the operator."""
+        self.watchdog = None if watchdog is None else Watchdog(watchdog)
+        self._verdict = Verdict.FRESH
+        """Of the newest message, while it follows."""
+        self._refused = ""
+        """Why the newest orders didn't count; empty if they did."""
+        self._newest: tuple[int, float, float] | None = None
+        """Number of the newest orders that counted, when they were sent and when they came [s]."""
+        self._uncertainty: float | None = None
+        """Of the operator's clock [s]; None where nothing is known."""
+        self._beat, self._due, self._reports = beat, now, reported
+
+    def join(self, orders: O, reason: str, *, now: float) -> None:
+        """Meet an operator in the midst of the epoch of these orders: wait for the next one, and report why."""
+        self.epoch, self.halted, self._due = orders.epoch, reason, now
+
+    def receive(self, orders: O, *, now: float, correction: float = 0.0, uncertainty: float = 0.0) -> None:
+        """Take in orders; those of an old epoch are ignored, as all are once it has stopped by itself.
+
+        Args:
+            orders: The message.
+            now: [s].
+            correction: What is to be added to its stamp [s].
+            uncertainty: Of that [s].
+        """
+        if orders.epoch > self.epoch and self.rests(now=now):
+            self.begin(orders, now)
+        if orders.epoch != self.epoch:
+            return
+        self._uncertainty = uncertainty if math.isfinite(uncertainty) else None
+        counts = self._counts(orders, now, correction, uncertainty)
+        self._heed(orders, now, counts=counts)
+        if not counts:
+            return
+        new = self._newest is None or orders.number > self._newest[0]
+        if new:
+            self._newest = orders.number, orders.sent_at, now
+        self._follow(orders, now, new=new)
+
+    def begin(self, orders: O, now: float) -> None:
+        """Follow a new epoch, from where the robot rests, if nothing is in the way."""
+        if not self._admits(orders) or (self.watchdog is not None and not self._armed(self.watchdog, orders, now)):
+            return
+        self.epoch, self.halted, self._newest = orders.epoch, "", None
+        self._start(orders, now)
+
+    def _armed(self, watchdog: Watchdog, orders: O, now: float) -> bool:
+        """Whether the watchdog lets a new epoch begin; the one before has ended with the robot at rest."""
+        self._watch(now)
+        if self.rearms and watchdog.state is WatchdogState.RUNNING:
+            watchdog.disarm(now=now)
+            watchdog.advance(now=now)
+            watchdog.stopped(watchdog.number, now=now)
+        return watchdog.arm(orders.epoch, now=now).counts
+
+    def _counts(self, orders: O, now: float, correction: float, uncertainty: float) -> bool:
+        """Whether the watchdog lets a message count."""
+        if self.watchdog is None:
+            return True
+        stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
+        verdict = self.watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
+        if verdict is Verdict.HALTED and self._carries_on:
+            return True
+        if verdict not in (Verdict.HALTED, Verdict.STALE_EPOCH, Verdict.UNKNOWN_EPOCH):
+            self._verdict = verdict
+            self._refused = "" if verdict.counts else f"the newest message was refused: {verdict.value}"
+        return verdict.counts
+
+    def _watch(self, now: float) -> None:
+        """Let the watchdog do what is due by now."""
+        watchdog = self.watchdog
+        if watchdog is None:
+            return
+        if any(isinstance(action, BeginStop) for action in watchdog.advance(now=now)):
+            self._lose(now)
+            if not self._carries_on:
+                self.halt(lost(watchdog.config, self._verdict), now=now)
+        if self._carries_on or (self.halted and self.rests(now=now)):
+            watchdog.stopped(watchdog.number, now=now)
+
+    def _stop_watching(self, reason: StopReason, now: float) -> None:
+        """Tell the watchdog that the robot stops, where it doesn't know."""
+        if self.watchdog is not None and self.watchdog.state is WatchdogState.RUNNING:
+            self.watchdog.stop(reason, now=now)
+
+    def advance(self, *, now: float) -> tuple[R, ...]:
+        """Do what is due, and say what is to be sent."""
+        self._watch(now)
+        if now < self._due:
+            return ()
+        self._due = now + self._beat
+        self._reports += 1
+        return (self._report(now),)
+
+    def next_deadline(self) -> float:
+        """When there's something to do."""
+        watch = None if self.watchdog is None else self.watchdog.next_deadline()
+        return self._due if watch is None else min(self._due, watch)
+
+    @abstractmethod
+    def rests(self, *, now: float) -> bool:
+        """Whether the robot is to stand still."""
+
+    @abstractmethod
+    def halt(self, reason: str, *, now: float) -> None:
+        """Stop, and wait for a new epoch."""
+
+    @abstractmethod
+    def _admits(self, orders: O) -> bool:
+        """Whether a new epoch may begin, with the robot at rest."""
+
+    @abstractmethod
+    def _start(self, orders: O, now: float) -> None:
+        """Begin an epoch."""
+
+    def _heed(self, orders: O, now: float, *, counts: bool) -> None:
+        """Do what of orders of this epoch is done even where they don't count."""
+
+    @abstractmethod
+    def _follow(self, orders: O, now: float, *, new: bool) -> None:
+        """Follow orders that count, in whatever order they come, unless it has halted."""
+
+    @property
+    def _carries_on(self) -> bool:
+        """Whether it goes on by itself though the operator is lost."""
+        return False
+
+    def _lose(self, now: float) -> None:
+        """The operator is lost: what the robot does by itself ends or goes on."""
+
+    @abstractmethod
+    def _report(self, now: float) -> R:
+        """What is told now, with the newest number."""
+
+
+def lost(watchdog: WatchdogConfig, verdict: Verdict) -> str:
+    """Why a robot halts that has lost its operator, and what mends it.
+
+    Args:
+        watchdog: By which it has.
+        verdict: What became of the newest message.
+    """
+    mend = "on a link this slow start vrs serve with --link-loss hold"
+    if verdict.counts:
+        return f"{LOST} ({mend})"
+    if verdict is Verdict.TOO_OLD:
+        mend = f"{watchdog.max_age:g} s are allowed: {mend}, or vrs robot with a larger --max-age"
+    return f"{LOST} (the newest message was refused: {verdict}; {mend})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,491 +253,3 @@ class AdaptiveOffset:
         """Timeline time less the robot's clock [s]; None before the first message."""
         age = self._ages.quantile(self._config.share)
         return None if age is None else -(age + self._config.margin)
-
-
-WAITING_MOST = 4096
-"""So far ahead of the one that's missing entries are kept."""
-
-
-class ReceivedLog:
-    """Which entries came, and up to when the timeline is complete with those that were carried out."""
-
-    def __init__(self, complete_until: float) -> None:
-        self.complete_until = complete_until
-        self._entries: Incoming[LogEntry] = Incoming(WAITING_MOST)
-        self._claims: deque[tuple[int, float]] = deque(maxlen=WAITING_MOST)
-
-    @property
-    def executed(self) -> int:
-        """Number of the newest entry before which none is missing."""
-        return self._entries.count
-
-    def due(self, entries: tuple[LogEntry, ...], *, as_they_come: bool) -> list[LogEntry]:
-        """Entries to be carried out now, each once."""
-        new = {entry.number: entry for entry in entries if self._entries.expects(entry.number)}
-        in_order = [due for entry in entries for due in self._entries.take(entry.number, (entry,))]
-        return list(new.values()) if as_they_come else in_order
-
-    def claim(self, newest: int, complete_until: float) -> None:
-        """A message said that with all entries up to the newest nothing changes before a time."""
-        self._claims.append((newest, complete_until))
-        held = [c for c in self._claims if c[0] > self.executed]
-        if len(held) < len(self._claims):
-            kept = max(c[1] for c in self._claims if c[0] <= self.executed)
-            self.complete_until = max(self.complete_until, kept)
-            self._claims = deque(held, maxlen=WAITING_MOST)
-
-
-_TELL_MOST = 4096
-"""Most receipts that wait to be reported."""
-SEGMENTS_MOST = 2000
-"""Most segments of a plan in one report."""
-_SETTLE = 0.05
-"""How long the arm is held at least where it was measured [s]."""
-_AIM = 5
-"""Messages after which the aim of play is worked out again."""
-_REPEAT = 4
-"""Reports that a receipt is told in."""
-_AGAIN = 10
-"""Every so many reports tell the oldest receipts again that the operator isn't known to have."""
-_OLDEST = 64
-"""So many of them."""
-_PLAYS = 16
-"""Epochs and stops of which the play time is kept."""
-_SAME = 1e-9
-"""Times nearer than this [s] are one."""
-
-
-@dataclass(frozen=True, slots=True)
-@validated
-class RobotSiteConfig:
-    """How the robot's site behaves."""
-
-    fixed_offset: float | None = None
-    """D = −D_f, as in the paper: timeline time less the robot's clock [s]; None adapts."""
-    offset: OffsetConfig = field(default_factory=OffsetConfig)
-    """How much delay an adaptive offset hides."""
-    playout: PlayoutConfig = field(default_factory=PlayoutConfig)
-    """How play follows it."""
-    beat: Annotated[float, within(1e-3, 10.0)] = 0.1
-    """Time between two reports [s], in [0.001, 10]."""
-    tolerance: Annotated[float, within(1e-6, 10.0)] = 0.1
-    """Following error of a joint above which the robot stops [rad, of a prismatic one m], in [1e-6, 10]."""
-    watchdog: WatchdogConfig | None = None
-    """When the link counts as lost, and the robot halts; None holds: it goes on when messages come again."""
-
-    def __post_init__(self) -> None:
-        if self.fixed_offset is not None:
-            finite("fixed_offset", self.fixed_offset, "None or finite seconds")
-
-
-class JointReference(NamedTuple):
-    """What the body is to follow, (k, n) each."""
-
-    q: Array
-    """[rad]."""
-    qd: Array
-    """[rad/s]."""
-    qdd: Array
-    """[rad/s²]."""
-
-
-class RobotSite:
-    """What runs beside the real robot, all but its body."""
-
-    def __init__(
-        self, model: RobotModel, q: Array, *, now: float, config: RobotSiteConfig | None = None, reported: int = 0
-    ) -> None:
-        """Stand at rest until the first message comes.
-
-        Args:
-            model: The robot.
-            q: Joints [rad], (n,).
-            now: By the robot's clock [s].
-            config: How to behave.
-            reported: Number that no report or sample of an earlier life, which the operator may know, was above.
-        """
-        self.config = RobotSiteConfig() if config is None else config
-        self._model = model
-        self._clock = ManualClock(now)
-        self.engine = Engine(model, q=q)
-        self.epoch = 0
-        self.halted = ""
-        """Why it stopped by itself; empty while it follows the operator."""
-        self.violation: Violation | None = None
-        """What was measured that stopped it; None where it wasn't that, or since it may move again."""
-        self._prismatic = model.prismatic
-        self._monitor = SensorMonitor(model.limits, model.prismatic)
-        self._uncertainty: float | None = None
-        self.parted = False
-        """Whether its timeline is another than the operator's."""
-        fixed = self.config.fixed_offset
-        self._play: Playout | EvenPlay = EvenPlay(now, 0.0) if fixed is None else EvenPlay(fixed)
-        self._plays: deque[tuple[float, Playout | EvenPlay]] = deque([(now, self._play)], maxlen=_PLAYS)
-        self._offset = AdaptiveOffset(self.config.offset)
-        self._log = ReceivedLog(-math.inf)
-        self._newest: tuple[int, float, float] | None = None
-        self._messages = 0
-        self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=_TELL_MOST)
-        self._reports = reported
-        self._due = now
-        self._measured, self._measured_at = np.array(q, float), (now, self._play_at(now))
-        self._samples = SampleLog(len(self._measured), reported)
-        self.watchdog = None if self.config.watchdog is None else Watchdog(self.config.watchdog)
-        self._verdict = Verdict.FRESH
-
-    @property
-    def playout(self) -> Playout | None:
-        """How an adaptive offset is played; None with a fixed one."""
-        return self._play if isinstance(self._play, Playout) else None
-
-    @property
-    def complete_until(self) -> float:
-        """Up to where its timeline is known to be complete [s]."""
-        return self._log.complete_until
-
-    def join(self, orders: Orders, reason: str, *, now: float) -> None:
-        """Meet an operator whose timeline isn't known here: as after a stop by itself, in the operator's epoch.
-
-        Args:
-            orders: Of that epoch.
-            reason: What to report.
-            now: By the robot's clock [s].
-        """
-        fixed = self.config.fixed_offset
-        self.engine = Engine(self._model, timeline=Timeline(self._measured, orders.sent_at))
-        # The next epoch begins after that by the operator's own clock, perhaps before now by what is known of it.
-        self._play = EvenPlay(0.0, end=orders.sent_at) if fixed is None else EvenPlay(fixed)
-        self._plays = deque([(now, self._play)], maxlen=_PLAYS)
-        self.epoch, self.halted, self.parted = orders.epoch, reason, True
-        self._due = now
-
-    def receive(self, orders: Orders, *, now: float, correction: float = 0.0, uncertainty: float = 0.0) -> None:
-        """Take in a message of the operator; what is of an old epoch is ignored, as all is once it has stopped.
-
-        Args:
-            orders: The message.
-            now: By the robot's clock [s].
-            correction: The robot's clock less the operator's, as far as it's known now [s].
-            uncertainty: Of that [s].
-        """
-        self._samples.ask(orders.wanted)
-        self.advance_play(now=now)
-        if orders.epoch > self.epoch and self.rests(now=now):
-            self.begin(orders, now)
-        if orders.epoch != self.epoch or not self._counts(orders, now, correction, uncertainty):
-            return
-        self._uncertainty = uncertainty if math.isfinite(uncertainty) else None
-        if self._newest is None or orders.number > self._newest[0]:
-            self._newest = orders.number, orders.sent_at, now
-        while self._receipts and self._receipts[0][0] <= orders.heard:
-            self._receipts.popleft()
-        if orders.halted:
-            self.halt(f"the operator's site: {orders.halted}", now=now)
-        if self.halted:
-            return
-        self._offset.heard(self._log.complete_until, now=now)
-        fixed = not isinstance(self._play, Playout)
-        for entry in self._log.due(orders.entries, as_they_come=fixed):
-            self._carry_out(entry, now)
-        self._log.claim(orders.newest, orders.complete_until)
-        if isinstance(self._play, Playout):
-            if self._messages % _AIM == 0:
-                D = self._offset.D
-                assert D is not None
-                self._play.aim(D - self._play.reserve, now=now)
-            self._messages += 1
-            self._play.hear(self._log.complete_until, self.engine.timeline, now=now)
-
-    def _counts(self, orders: Orders, now: float, correction: float, uncertainty: float) -> bool:
-        """Whether the watchdog lets a message count."""
-        if self.watchdog is None:
-            return True
-        stamp = Stamp(orders.epoch, orders.number, orders.sent_at + correction)
-        self._verdict = self.watchdog.heard(stamp, now=now, authentic=True, uncertainty=uncertainty)
-        return self._verdict.counts
-
-    def _watch(self, now: float) -> None:
-        """Let the watchdog do what is due by now."""
-        if self.watchdog is None:
-            return
-        for action in self.watchdog.advance(now=now):
-            if isinstance(action, BeginStop):
-                self.halt(lost(self.watchdog.config, self._verdict), now=now)
-        if self.halted and self.rests(now=now):
-            self.watchdog.stopped(self.watchdog.number, now=now)
-
-    def begin(self, orders: Orders, now: float) -> None:
-        """Follow a new epoch, from where the arm rests."""
-        if self.watchdog is not None:
-            self._watch(now)
-            if not self.watchdog.arm(orders.epoch, now=now).counts:
-                return
-        fixed, stood = self.config.fixed_offset, self.engine.timeline
-        began = orders.epoch_began if fixed is None else engine_time(now, fixed)
-        # Play never goes back.
-        began = max(began, self._play_at(now))
-        self._clock = ManualClock(began)
-        if len(stood):
-            self.engine = Engine(self._model, timeline=stood, clock=self._clock)
-        else:
-            self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
-        self.epoch, self.halted, self.violation, self.parted = orders.epoch, "", None, False
-        self._log, self._newest, self._messages = ReceivedLog(began), None, 0
-        self._offset = AdaptiveOffset(self.config.offset)
-        self._receipts.clear()
-        self._play = (
-            Playout(self.engine.timeline, self.engine.limits, now=now, p=began, config=self.config.playout)
-            if fixed is None
-            else EvenPlay(fixed)
-        )
-        self._plays.append((now, self._play))
-
-    def _carry_out(self, entry: LogEntry, now: float) -> None:
-        at = entry.at if isinstance(self._play, Playout) else engine_time(self._play_at(now), 0.0)
-        self._clock.set(max(at, self._clock.now()))
-        newest = self.engine.newest
-        try:
-            self.engine.count_from(entry.command_id)
-            command = entry.command
-            answer = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
-        except VrsError:
-            self.parted = True
-            return
-        finally:
-            self.engine.count_from(max(newest, self.engine.newest))
-        if not isinstance(answer, Receipt):
-            return
-        asked = getattr(entry.command, "execute_at", None)
-        late = asked is not None and answer.execute_at is not None and answer.execute_at > asked + _SAME
-        self.parted = self.parted or late or answer.status is Status.REJECTED
-        self._receipts.append((self._reports + 1, entry.number, answer))
-
-    def advance_play(self, *, now: float) -> None:
-        """Let play do what is due by now."""
-        if isinstance(self._play, Playout):
-            self._play.advance(now=now)
-
-    def advance(self, *, now: float) -> tuple[Report, ...]:
-        """Do what is due by now [s], and say what is to be sent."""
-        self.advance_play(now=now)
-        self._watch(now)
-        if now < self._due:
-            return ()
-        self._due = now + self.config.beat
-        return (self._report(now),)
-
-    def rests(self, *, now: float) -> bool:
-        """Whether everything is over that it plays."""
-        return self._play_at(now) >= self.engine.timeline.end
-
-    def next_deadline(self) -> float:
-        """When there's something to do, by the robot's clock [s]."""
-        play = None if isinstance(self._play, EvenPlay) else self._play.next_deadline()
-        watch = None if self.watchdog is None else self.watchdog.next_deadline()
-        return min(self._due, math.inf if play is None else play, math.inf if watch is None else watch)
-
-    def play_at(self, t: Array) -> PlayState:
-        """Where play is at ascending times up to the next deadline, by the robot's clock [s], (k,)."""
-        return self._played(t, self._play.at)
-
-    def foreseen(self, t: Array) -> PlayState:
-        """Where play is at ascending times by the robot's clock [s], (k,), if nobody looks at it before."""
-        return self._played(t, self._play.foreseen)
-
-    def _played(self, t: Array, newest: Callable[[Array], PlayState]) -> PlayState:
-        """Where play is at ascending times by the robot's clock [s], (k,), the newest course by that function."""
-        since = self._plays[-1][0]
-        if not len(t) or t[0] >= since:
-            return newest(t)
-        earlier = ((began, play.at) for began, play in islice(reversed(self._plays), 1, None))
-        return play_of(chain([(since, newest)], earlier), t)
-
-    def reference(self, play: PlayState) -> JointReference:
-        """What the body follows where play is, (k, n) each."""
-        p, pace, rate = play.p, play.pace[:, None], play.rate[:, None]
-        q, qd, qdd = (self.engine.timeline.sample(p, derivative=k) for k in range(3))
-        return JointReference(q, qd * pace, qdd * pace * pace + qd * rate)
-
-    def measured(self, q: Array, *, now: float, at: float | None = None) -> bool:
-        """Take in measured joints; where one is too far from its reference, the robot stops.
-
-        What isn't sound is left out; where nothing else comes for `BLIND` seconds, the robot brakes.
-
-        Args:
-            q: Joints [rad], (n,): anything.
-            now: By the robot's clock [s].
-            at: When it was to be there, where that's another time [s].
-
-        Returns:
-            Whether it stops for that, and is to be held where it was measured.
-        """
-        if not self._monitor.look(q, now=now):
-            return self._violated(self._monitor.blind(now=now), now)
-        at = now if at is None else at
-        p = float(self.play_at(np.array([at])).p[0])
-        self._measured, self._measured_at = np.array(q, float), (at, p)
-        reference = self.engine.timeline.sample(p)
-        self._samples.add(at, p, self._measured, reference)
-        abort = too_far(reference, self._measured, self.config.tolerance, self._prismatic)
-        return self._violated(abort, now, measured=self._measured)
-
-    def _violated(self, violation: Violation | None, now: float, measured: Array | None = None) -> bool:
-        """Stop for what was measured, if it's something; whether it's to be held where it was measured."""
-        if violation is None or self.halted or self.epoch == 0:
-            return False
-        self.violation = violation
-        self.halt(str(violation), now=now, measured=measured)
-        return measured is not None
-
-    def halt(self, reason: str, *, now: float, measured: Array | None = None) -> None:
-        """Stop at once, and wait for a new epoch; who has stopped already only lets itself be held elsewhere.
-
-        Args:
-            reason: What to report.
-            now: By the robot's clock [s].
-            measured: Where to hold the arm [rad], (n,), when it's not where it should be; without it the arm brakes
-                from its reference, within the limits.
-        """
-        if self.halted and measured is None:
-            return
-        play = self.play_at(np.array([now]))
-        p, limits, timeline = float(play.p[0]), self.engine.limits, self.engine.timeline
-        if measured is not None:
-            timeline = timeline.edited(p, [hold(_SETTLE, np.clip(measured, limits.q_min, limits.q_max))])
-        elif play.pace[0] == 1.0 and play.rate[0] == 0.0:
-            timeline = from_commanded(timeline, p, limits).timeline
-        else:
-            # At another pace the arm moves at other speeds than the plan says.
-            state = State(*(row[0] for row in self.reference(play)))
-            timeline = timeline.edited(p, [piece(stop(state, Profile.PARABOLIC, limits)[0], HOLD)])
-        self._clock = ManualClock(p)
-        self.engine = Engine(self._model, timeline=timeline, clock=self._clock)
-        # What the next epoch puts after this end isn't played before that begins.
-        self._play = EvenPlay(p - now, end=timeline.end)
-        self._plays.append((now, self._play))
-        self.halted, self.parted = self.halted or reason, True
-        self._due = now
-        if self.watchdog is not None and self.watchdog.state is WatchdogState.RUNNING:
-            self.watchdog.stop(StopReason.FAULT if self.violation is None else StopReason.TOLERANCE, now=now)
-
-    def _play_at(self, now: float) -> float:
-        return float(self._play.at(np.array([now])).p[0])
-
-    def _report(self, now: float) -> Report:
-        self._reports += 1
-        p, pace, _ = self._play.at(np.array([now]))
-        plan = self._plan_from(float(p[0])) if self.parted else None
-        q = self._measured.copy()
-        q.flags.writeable = False
-        return Report(
-            cast("Epoch", self.epoch), self._reports, now, self._log.executed, float(p[0]), float(pace[0]), q,
-            *self._measured_at, self._newest, self.halted, self._told(), plan,
-            self.engine.timeline.sample(self._measured_at[1]), self._uncertainty, self._samples.take(),
-            self._samples.oldest,
-        )  # fmt: skip
-
-    def _told(self) -> tuple[tuple[int, Receipt], ...]:
-        """Receipts for a report: new ones, those of the reports just before, and now and then the oldest."""
-        told = []
-        for since, number, receipt in reversed(self._receipts):
-            if since <= self._reports - _REPEAT:
-                break
-            told.append((number, receipt))
-        if self._reports % _AGAIN == 0:
-            told += [(number, receipt) for _, number, receipt in islice(self._receipts, _OLDEST)]
-        return tuple(told)
-
-    def _plan_from(self, p: float) -> PlanPart:
-        timeline = self.engine.timeline
-        low = max(timeline.index_at(p), 0)
-        high = min(low + SEGMENTS_MOST, len(timeline))
-        since = timeline.start_of(low) if low < len(timeline) else timeline.end
-        segments = tuple(timeline.segment(i) for i in range(low, high))
-        return PlanPart(timeline.version, since, timeline.sample(since), segments=segments)
-
-
-@dataclass(frozen=True, slots=True)
-class RobotHostConfig(HostConfig):
-    """How an arm's end of a connection behaves."""
-
-    site: RobotSiteConfig = field(default_factory=RobotSiteConfig)
-    """How its site behaves."""
-
-    def decided(self) -> RobotSiteConfig:
-        """How the site behaves that decides a lead ahead: a stop at T_loss is decided that much sooner."""
-        watchdog = self.site.watchdog
-        if watchdog is None:
-            return self.site
-        return replace(self.site, watchdog=replace(watchdog, timeout=max(watchdog.timeout - self.lead, 0.1)))
-
-
-class RobotHost(Host[RobotSite, Orders, Report]):
-    """An arm's end of a connection: what its body is to do are joints.
-
-    Everything is decided some `lead` ahead of the robot's clock: what the body has been given for the next ticks
-    never changes.
-    """
-
-    orders = Orders
-
-    def __init__(
-        self, model: RobotModel, q: Array, *, now: float, config: RobotHostConfig | None = None, seed: int = 0
-    ) -> None:
-        """Stand at rest, and wait for an operator.
-
-        Args:
-            model: The robot.
-            q: Joints [rad], (n,).
-            now: By the robot's clock [s].
-            config: How to behave.
-            seed: Random number in [0, 2**32), new for each life of the robot: echoes of an earlier one don't count.
-        """
-        self.config = RobotHostConfig() if config is None else config
-        super().__init__(self._site_from, self.config, now=now, seed=seed)
-        self._model = model
-        self._q = np.array(q, float)
-
-    def _site_from(self, t: float) -> RobotSite:
-        site = replace(self.config.site, watchdog=self.watchdog(self.config.site.watchdog))
-        config = replace(self.config, site=site).decided()
-        reported = max(0, math.floor(1000.0 * t))
-        return RobotSite(self._model, self._q, now=t, config=config, reported=reported)
-
-    @override
-    def _left(self, now: float) -> None:
-        self._q = self.reference(np.array([now])).q[0]
-
-    def reference(self, t: Array) -> JointReference:
-        """What the body is to do, (k, n) each, at ascending times of the robot's clock [s] if no more is heard."""
-        if self.site is None:
-            still = np.zeros((len(t), len(self._q)))
-            return JointReference(still + self._q, still, still)
-        play = self.site.foreseen(np.asarray(t, float) + self.offset)
-        return self.site.reference(play)
-
-    def measured(self, q: Array, *, at: float, now: float) -> bool:
-        """Take in measured joints.
-
-        Args:
-            q: Joints [rad], (n,).
-            at: When they were to be there, by the robot's clock [s].
-            now: By the robot's clock [s].
-
-        Returns:
-            Whether one is too far away, so that the robot stops and is to be held where it was measured.
-        """
-        return self.site is not None and self.site.measured(q, now=self.site_time(now), at=at + self.offset)
-
-    def fault(self, reason: str, q: Array, *, now: float) -> None:
-        """Stop, for the body has left its references by itself.
-
-        Args:
-            reason: What to report.
-            q: Where it will rest [rad], (n,).
-            now: By the robot's clock [s].
-        """
-        if self.site is None:
-            self._q = np.array(q, float)
-        else:
-            self.site.halt(reason, now=self.site_time(now), measured=q)

@@ -242,6 +242,24 @@ class Controller(Context):
         self.arm.retry(now=self.now)
         task.go_on(again=True)
 
+    def kill(self, *, now: float) -> None:
+        """KILL: what stands can't go on any more.
+
+        Raises:
+            ValError: If nothing does.
+        """
+        self._paused(now).end("KILL")
+
+    def finish(self) -> None:
+        """DONE: the present cycle of a program is its last.
+
+        Raises:
+            ValError: If none runs.
+        """
+        if self._program is None or not self.running:
+            raise ValError("No program running")
+        self._program.cycles = 1
+
     def answer(self, text: str, *, now: float) -> None:
         """A line for the PROMPT that asked.
 

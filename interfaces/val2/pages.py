@@ -7,7 +7,6 @@ import contextlib
 import json
 import math
 from collections import deque
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final
 
@@ -23,7 +22,6 @@ from interfaces.stream.sockets import let_stay
 from interfaces.val2.monitor.monitor import LONGEST, TerminalMonitor
 from interfaces.val2.monitor.state import Expects, OutputText, Style
 from interfaces.val2.rooms import TerminalRoom
-from vrs.errors import VrsError
 
 PATH: Final = "/val"
 """Where pages open their terminals."""
@@ -47,7 +45,7 @@ BLOCKED: Final = 2.0
 """A page is cut off when a message has waited so long to be sent [s]."""
 SUGGESTED: Final = 60
 """Words that are suggested at once."""
-_POLICY, _TRY_AGAIN, _FAILED = 1008, 1013, 1011
+_POLICY, _TRY_AGAIN = 1008, 1013
 _Text = Annotated[str, Meta(max_length=4 * LONGEST)]
 _Key = Annotated[str, Meta(max_length=256)]
 
@@ -57,14 +55,12 @@ class PageHello(msgspec.Struct, frozen=True, tag="hello"):
 
     token: _Key | None = None
     session: _Key = ""
-    holds: bool = False
 
 
 class Who(msgspec.Struct, frozen=True, tag="who"):
-    """The page has another session, or its lease has come or gone."""
+    """The page has another session."""
 
     session: _Key
-    holds: bool
 
 
 class TypedLines(msgspec.Struct, frozen=True, tag="lines"):
@@ -94,13 +90,11 @@ _read: Final = msgspec.json.Decoder(PageHello | Who | TypedLines | Interrupt | C
 
 @dataclass(slots=True, eq=False)
 class PageTerminal:
-    """A page's terminal: messages in, messages out. It's the person, too, whose control the monitor asks for."""
+    """A page's terminal: messages in, messages out."""
 
     token: str | None = None
     session: str = ""
     """Of the page, by which it commands; empty before it's known."""
-    holds: bool = False
-    """Whether the page says that it has the lease."""
     closing: tuple[int, str] | None = None
     """Code and reason with which the connection is to be closed."""
     monitor: TerminalMonitor | None = None
@@ -117,10 +111,6 @@ class PageTerminal:
     """The prompt that the page was told last; None where it's to be told again."""
     wake: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when there may be something to send."""
-
-    def take(self) -> None:
-        """Let the page ask for the lease."""
-        self._answers.append({"type": "take"})
 
     def begin(self, monitor: TerminalMonitor, *, now: float) -> None:
         """Let a monitor speak and listen."""
@@ -149,10 +139,12 @@ class PageTerminal:
             return
         monitor = self.monitor
         match message:
-            case PageHello(token, session, holds):
-                self.token, self.session, self.holds, self.greeted = token, session, holds, True
-            case Who(session, holds):
-                self.session, self.holds = session, holds
+            case PageHello(token, session):
+                self.token, self.session, self.greeted = token, session, True
+            case Who(session):
+                self.session = session
+                if monitor is not None:
+                    monitor.session = session
             case ShownCharacters(size):
                 self._shown = max(self._shown, min(size, self._sent))
             case Complete(text) if monitor is not None:
@@ -238,26 +230,22 @@ class PageTerminal:
 
 
 class PageTerminalServer:
-    """Terminals of pages; its route goes into an application. Their room is made for the first of them."""
+    """Terminals of pages in a room; its route goes into an application."""
 
-    def __init__(self, enter: Callable[[], Awaitable[TerminalRoom]], access: Access) -> None:
+    def __init__(self, room: TerminalRoom, access: Access) -> None:
         """Begin with nobody.
 
         Args:
-            enter: Gives the room, which may take a while.
+            room: What all terminals are at.
             access: What the token of a page opens; without any tokens, whoever comes is an operator.
         """
-        self._enter, self._access = enter, access
+        self._room, self._access = room, access
         self._terminals: set[PageTerminal] = set()
-        self._room: TerminalRoom | None = None
 
     @property
     def route(self) -> WebSocketRoute:
         """Where pages come."""
         return WebSocketRoute(PATH, self)
-
-    def _now(self) -> float:
-        return 0.0 if self._room is None else self._room.clock.now()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one page, until it goes."""
@@ -275,17 +263,17 @@ class PageTerminalServer:
                     terminal.close(_POLICY, f"at most {RATE:g} messages a second")
                 elif terminal.closing is None:
                     text = message.get("text")
-                    terminal.receive(message.get("bytes") or b"" if text is None else text, now=self._now())
+                    terminal.receive(
+                        message.get("bytes") or b"" if text is None else text, now=self._room.clock.now()
+                    )
                 if terminal.greeted or terminal.closing is not None:
                     met.set()
                 terminal.wake.set()
-                if self._room is not None:
-                    self._room.soon()
+                self._room.soon()
         finally:
             greeting.cancel()
             self._terminals.discard(terminal)
-            if self._room is not None:
-                self._room.leave(terminal)
+            self._room.leave(terminal)
             writing.cancel()
             await asyncio.wait([writing, greeting])
 
@@ -296,16 +284,14 @@ class PageTerminalServer:
                 await met.wait()
         if not terminal.greeted:
             terminal.close(_POLICY, f"hello must come within {GREETING:g} s")
-        try:
-            if terminal.closing is None:
-                self._room = room = await self._enter()
-                self._begin(terminal, room, scope)
-        except (VrsError, OSError) as error:
-            terminal.close(_FAILED, f"VAL-II isn't there: {error}")
+        await self._room.ready()
+        if terminal.closing is None:
+            self._begin(terminal, scope)
         terminal.wake.set()
 
-    def _begin(self, terminal: PageTerminal, room: TerminalRoom, scope: Scope) -> None:
-        monitor = room.monitor(self._access, terminal.token, terminal)
+    def _begin(self, terminal: PageTerminal, scope: Scope) -> None:
+        room = self._room
+        monitor = room.monitor(self._access, terminal.token, terminal.session)
         if monitor is None:
             terminal.close(_POLICY, "this token opens no terminal")
         elif sum(other.monitor is not None for other in self._terminals) >= MOST:

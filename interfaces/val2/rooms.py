@@ -1,33 +1,31 @@
-"""VAL's monitor at a server's own robot: one controller, and the terminals of pages and connections that are at it.
-
-The controller is a client of the server like any other, made for the first terminal.
-"""
+"""VAL's monitor at a server's own robot: one controller, and the terminals of pages and connections at it."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from interfaces.messages.control import Role
 from interfaces.stream.access import Access
+from interfaces.stream.local import LocalClient
 from interfaces.timer import Turning
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import LeaseControl, SharedController, SharedOperator
+from interfaces.val2.monitor.control import ServedControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
+from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.parser import parse_expression
 from vrs.clock import Clock
-from vrs.errors import VrsError
 
 if TYPE_CHECKING:
-    from interfaces.stream.connection import Connection
-    from interfaces.val2.motion import Arm
+    from interfaces.teleop import OperatorSite
+    from interfaces.teleop.virtual_arm import VirtualArm
 
 HOST: Final = "127.0.0.1"
 """Terminals come from this machine only: there's no encryption."""
+FAULT_POLL: Final = 0.05
+"""How often it's looked whether the real robot has stopped by itself [s]."""
 
 
 class RoomTerminal(Protocol):
@@ -60,20 +58,22 @@ class TerminalRoom:
         self._terminals: set[RoomTerminal] = set()
         self._turning = Turning(clock, self._turn)
 
-    def monitor(
-        self, access: Access, token: str | None, person: SharedOperator | None = None
-    ) -> TerminalMonitor | None:
+    async def ready(self) -> None:
+        """Wait until lines can be read: the first time it takes a second to make the grammar's tables."""
+        await asyncio.to_thread(parse_expression, "1")
+
+    def monitor(self, access: Access, token: str | None, session: str | None = None) -> TerminalMonitor | None:
         """A monitor for whoever shows a token; None for a wrong one.
 
         Args:
             access: What tokens open.
             token: The token.
-            person: Who it is, where they command by a session of their own, too.
+            session: By which they command from elsewhere, too.
         """
         read_only = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
         if read_only and access.refusal(Role.VIEWER, token):
             return None
-        return TerminalMonitor(self._shared, self._files, self._version, read_only=read_only, person=person)
+        return TerminalMonitor(self._shared, self._files, self._version, read_only=read_only, session=session)
 
     def join(self, terminal: RoomTerminal) -> None:
         """Move a terminal on from now."""
@@ -98,67 +98,20 @@ class TerminalRoom:
         return min([self._shared.next_deadline(), *(terminal.next_deadline() for terminal in self._terminals)])
 
 
-class ServedVal:
-    """The room at a server's robot, made for the first terminal. Enter `running` in the server's loop."""
+def served_room(client: LocalClient, site: OperatorSite[VirtualArm], directory: Path, version: str) -> TerminalRoom:
+    """The room at a server's robot, which a client of the server in its own process moves.
 
-    def __init__(self, url: str, token: str | None, directory: Path, version: str) -> None:
-        """Connect to nothing yet.
-
-        Args:
-            url: Of the server, `ws://HOST:PORT/ws`.
-            token: By which this is an operator there.
-            directory: Of LOAD and STORE.
-            version: Name and version of the program.
-        """
-        self._url, self._token = url, token
-        self._files, self._version = Files(directory, examples=examples()), f"{version}, VAL-II"
-        self._entering: asyncio.Task[TerminalRoom] | None = None
-        self._connection: Connection | None = None
-
-    @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[ServedVal]:
-        """Let terminals come meanwhile."""
-        try:
-            yield self
-        finally:
-            if self._entering is not None:
-                await asyncio.wait([self._entering])
-            if self._connection is not None:
-                await asyncio.to_thread(self._connection.close)
-
-    async def enter(self) -> TerminalRoom:
-        """What all terminals are at.
-
-        Raises:
-            VrsError: If the server can't be reached; the next one who comes tries anew.
-        """
-        if self._entering is None:
-            self._entering = asyncio.create_task(self._made())
-        entering = self._entering
-        try:
-            return await asyncio.shield(entering)
-        except (VrsError, OSError):
-            self._entering = None if self._entering is entering else self._entering
-            raise
-
-    async def _made(self) -> TerminalRoom:
-        connection, arm = await asyncio.to_thread(self._connect)
-        self._connection = connection
-        controller = Controller(arm, parameters=arm.parameters, now=connection.now())
-        shared = SharedController(controller, LeaseControl(connection))
-        return TerminalRoom(shared, connection, self._files, self._version)
-
-    def _connect(self) -> tuple[Connection, Arm]:
-        from interfaces import connect
-        from interfaces.val2.motion import arm_for
-
-        parse_expression("1")  # Makes the grammar's tables, which takes a second, beside the loop.
-        connection = connect(self._url, token=self._token, name="VAL-II terminals")
-        try:
-            return connection, arm_for(connection)
-        except BaseException:
-            connection.close()
-            raise
+    Args:
+        client: The client.
+        site: Where the robot is.
+        directory: Of LOAD and STORE.
+        version: Name and version of the program.
+    """
+    robot = SiteRobot(site, lambda command, _now: client.execute(command), fault_poll_interval=FAULT_POLL)
+    arm = Arm(robot)
+    controller = Controller(arm, parameters=arm.parameters, now=client.now())
+    shared = SharedController(controller, ServedControl(client))
+    return TerminalRoom(shared, client, Files(directory, examples=examples()), f"{version}, VAL-II")
 
 
 def examples() -> Path | None:

@@ -17,7 +17,7 @@ from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
 from robots.robot import Robot
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
-from vrs.ledger import Receipt
+from vrs.ledger import Receipt, Status
 from vrs.model import home
 
 LONGEST: Final = 600.0
@@ -51,11 +51,18 @@ class _Operator:
     player: Player = field(init=False)
     _holds: bool = False
 
-    def executed(self, now: float, command: Command, receipt: Receipt) -> None:
-        """Record a command that the virtual robot accepted."""
-        assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))
-        self.session.sent(now, command, receipt)
-        self.motions.append(PlannedMotion(self.name, now, command))
+    def execute(self, command: Command | None, now: float) -> Receipt | None:
+        """Let the operator's site carry out a command, and record what the virtual robot accepts."""
+        virtual = self.session.operator.robot
+        if command is None:
+            return virtual.undo(now=now)
+        answer = virtual.execute(command, now=now)
+        assert isinstance(answer, Receipt)
+        if answer.status is not Status.REJECTED:
+            assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))
+            self.session.sent(now, command, answer)
+            self.motions.append(PlannedMotion(self.name, now, command))
+        return answer
 
     def gripped(self, t: float, holds: bool) -> None:
         """Let the real hand hold what the parameter HAND.LOAD says [kg], or nothing."""
@@ -117,7 +124,7 @@ def play(
             start, robot, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
         )
         operator = _Operator(session, limit, source.name)
-        site = SiteRobot(session.operator, operator.executed)
+        site = SiteRobot(session.operator, operator.execute)
         val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
         operator.player = player = Player(source, val, listeners or Listeners(), rng)

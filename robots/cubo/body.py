@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from robots.bullet.rooms import Room
 from robots.cubo import parameters as p
-from robots.ipr.body import MobileBody
-from robots.ipr.chassis import Limb, MobileReality, Senses, SonarModel
-from robots.ipr.position import FusedPosition, TruePosition
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
+from robots.mobile.position import FusedPosition, TruePosition
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped

@@ -12,7 +12,7 @@ import math
 from pathlib import Path
 from typing import Final
 
-from robots.ipr.chassis import Chassis, Limb, Lump
+from robots.mobile.chassis import Chassis, Limb, Lump
 from vrs.mobile import DriveLimits
 
 MODEL_FILE: Final = Path(__file__).with_name("cubo.xmi")

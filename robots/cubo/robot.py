@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from robots.base import Footprint, MobileBase
+from robots.base import PERIOD, Footprint, MobileBase
 from robots.cubo.body import MOVES, CuboBody
 from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, WHEEL_RADIUS
 from robots.cubo.shapes import links, shapes
-from robots.ipr.model import PERIOD
 from robots.robot import Appearance, Robot, ThinClient
 from vrs.mobile import Wheels
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from robots.base import upright
 from robots.cubo import parameters as p
-from robots.ipr.drive_train import as_posture
-from robots.ipr.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, wheel
+from robots.mobile.drive_train import as_posture
+from robots.mobile.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, wheel
 from robots.solids import Builder, LinkShape, drum, loft, slab
 from vrs.checks import finite_array
 from vrs.model import Array, frozen_array

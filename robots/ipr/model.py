@@ -9,18 +9,10 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final
 
-from robots.base import Footprint, MobileBase
+from robots.base import PERIOD, Footprint, MobileBase
 from robots.onboard.driving import IPR_WHEEL_BASE, drive_limits
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, Wheels
-
-PERIOD: Final = 0.1
-"""T: time between commands [s], an assumption: [H] has 'every sampling time T' without a figure."""
-
-CELLS: Final = (125, 61)
-"""Cells of the virtual environment along x and y; [H], section 3.2."""
-CELL: Final = 0.1
-"""Side of a cell [m], an assumption: a room of 12.5 m × 6.1 m, and a robot of about five cells across."""
 
 IPR_LENGTH: Final = 0.52
 """Along the direction of travel [m]; [K]: 45 × 52 × 75 cm."""

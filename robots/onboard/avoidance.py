@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
@@ -130,13 +131,16 @@ class SonarMount:
     """Where it looks [rad], from forward to the left."""
 
 
+Mounts = Annotated[tuple[SonarMount, ...], Meta(min_length=1, max_length=64)]
+
+
 @dataclass(frozen=True, slots=True)
 @validated
 class AvoidanceConfig:
     """What the robot is, and how careful."""
 
     outline: Outline
-    mounts: tuple[SonarMount, ...]
+    mounts: Mounts
     """As many as there are readings, 1 to 64."""
     half_cone: Annotated[float, within(0.0, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0, 0.8]."""
@@ -160,10 +164,6 @@ class AvoidanceConfig:
     """Of the motors and of the sonar, the longest to be expected [s], in [0, 1]."""
     limits: DriveLimits = IPR_LIMITS
     """Of the robot."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= len(self.mounts) <= 64:
-            raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
 
 
 class ObstacleAvoidance:

@@ -23,10 +23,9 @@ from typing import Annotated
 
 import numpy as np
 
-from robots.onboard.avoidance import ObstacleAvoidance, Outline, SonarMount
+from robots.onboard.avoidance import Mounts, ObstacleAvoidance, Outline
 from robots.onboard.driving import IPR_LIMITS, Drive
 from vrs.checks import validated, within
-from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, wrapped
 from vrs.model import Array
 
@@ -36,7 +35,7 @@ from vrs.model import Array
 class MoversConfig:
     """How things are followed."""
 
-    mounts: tuple[SonarMount, ...]
+    mounts: Mounts
     """As many as there are readings, 1 to 64, in order around the robot."""
     half_cone: Annotated[float, within(0.0, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0, 0.8]."""
@@ -66,10 +65,6 @@ class MoversConfig:
     """Nothing is said of what was first seen a shorter time ago [s], in [0, 10]."""
     most: Annotated[int, within(1, 1000)] = 16
     """Most things that are followed, 1 to 1000."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= len(self.mounts) <= 64:
-            raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from robots.onboard.avoidance import SonarMount
+from robots.onboard.avoidance import Mounts
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid
@@ -49,7 +49,7 @@ class CellChange(NamedTuple):
 class SupervisorConfig:
     """What the sonars are, and what is believed."""
 
-    mounts: tuple[SonarMount, ...]
+    mounts: Mounts
     """As many as there are readings, 1 to 64."""
     half_cone: Annotated[float, within(0.01, 0.8)] = math.radians(12.5)
     """Half the sonar's cone [rad], in [0.01, 0.8]."""
@@ -80,10 +80,6 @@ class SupervisorConfig:
     """Most changes in a report, 1 to 4096."""
     most_kept: Annotated[int, within(1, 100000)] = 4096
     """Most cells that are kept, 1 to 100,000; there, those that were seen longest ago go first."""
-
-    def __post_init__(self) -> None:
-        if not 1 <= len(self.mounts) <= 64:
-            raise InvalidValueError("mounts", len(self.mounts), "1 to 64")
 
 
 @dataclass(slots=True)

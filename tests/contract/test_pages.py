@@ -27,7 +27,7 @@ PLAY: Final = {
 }  # fmt: skip
 DOORS: Final = {
     "arm": {"/": HTML, "/health": JSON, "/station/vrs.js": SCRIPT, **VIEW, **PLAY},
-    "base": {"/": HTML, "/health": JSON, "/station/vrs.js": SCRIPT, "/media/still": JPEG, **VIEW},
+    "base": {"/": HTML, "/health": JSON, "/station/vrs.js": SCRIPT, "/media/still": JPEG, **VIEW, **PLAY},
     "replay": PLAY,
 }
 """What is served, and of which kind; scripts and styles besides are what the pages name."""
@@ -40,7 +40,7 @@ NOT_HERE: Final = {
         "/recordings/copy/x",
         "/docs",
     ),
-    "base": ("/nothing", "/station/station.py", "/view/%2e%2e/secret", "/replay", "/docs"),
+    "base": ("/nothing", "/station/station.py", "/view/%2e%2e/secret", "/recordings/copy/x", "/docs"),
     "replay": ("/nothing", "/replay/replay.py", "/station/vrs.js", "/docs"),
 }
 FRAMES: Final = re.compile("/(view|replay)(/|$)")

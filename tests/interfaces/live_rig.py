@@ -32,7 +32,7 @@ from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import load
 from robots.onboard import WatchdogConfig
-from robots.robot import EXACT
+from robots.robot import IDEAL
 
 ROBOT = load("puma560")
 MODEL = ROBOT.arm
@@ -73,7 +73,7 @@ class Rows:
 
 @contextlib.asynccontextmanager
 async def robot_here(
-    *, site: RobotSiteConfig | None = None, body: str = EXACT, port: int = 0
+    *, site: RobotSiteConfig | None = None, body: str = IDEAL, port: int = 0
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
@@ -93,7 +93,7 @@ async def operator_here(url: str, *, delay: str = "none") -> AsyncIterator[tuple
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(LiveOperatorConfig(ROBOT, NOMINAL, url, link), Access(free=OPEN))
+    operator = LiveOperator(LiveOperatorConfig(ROBOT, url, link, q=NOMINAL), Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"

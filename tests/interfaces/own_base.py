@@ -7,9 +7,10 @@ from functools import partial
 
 from robots import Robot
 from robots.base import MobileBase
-from robots.ipr.body import MobileBody
-from robots.ipr.chassis import IPR, Lump
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.body import MobileBody
+from robots.mobile.chassis import Lump
+from robots.mobile.robot import BareBody
 from vrs.mobile import DriveLimits, Wheels
 
 CHASSIS = replace(

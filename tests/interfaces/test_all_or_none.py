@@ -22,7 +22,7 @@ from interfaces.messages import Order, Outcome
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import Report, Sample
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import Correction, OperatorSite, RobotSite
+from interfaces.teleop import Correction, FollowingArm, OperatorSite, VirtualArm
 from robots import puma560
 from vrs import (
     Cancel,
@@ -91,11 +91,11 @@ class Sites:
     """Both sites of an arm in virtual time, and a client of the operator's; three moves are scheduled."""
 
     def __init__(self, *before: Command | None) -> None:
-        self.operator = OperatorSite(MODEL, NOMINAL, now=0.0)
-        self.robot = RobotSite(MODEL, NOMINAL, now=0.0)
+        self.operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+        self.robot = FollowingArm(MODEL, NOMINAL, now=0.0)
         link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.02")))
         self.lab = Laboratory(self.operator, self.robot, link, np.random.default_rng(0))
-        self.site = Site(self.operator.engine)
+        self.site = Site(self.operator.robot.engine)
         self.servlet = self.site.servlet()
         self.notes = self.operator.listener = Notes()
         self.number = 0
@@ -113,14 +113,14 @@ class Sites:
     def order(self, command: Command | None, now: float = NOW, *, again: bool = False) -> Outcome:
         """Give an order, or the same again; its outcome."""
         self.number += not again
-        self.operator.engine.clock.set(now)  # type: ignore[union-attr]
+        self.operator.robot.engine.clock.set(now)  # type: ignore[union-attr]
         self.servlet.receive(Order(self.number, command), now=now)
         found = [reply for reply in self.servlet.advance(now=now) if isinstance(reply, Outcome)]
         return [outcome for outcome in found if outcome.number == self.number and not outcome.revision][-1]
 
     def state(self) -> Any:
         """All that a command may change, as values; without the answers to what was refused."""
-        operator, plan = self.operator, self.operator.engine.scheduler
+        operator, robot, plan = self.operator, self.operator.robot, self.operator.robot.engine.scheduler
         rejected = {i for i, entry in plan.ledger.entries.items() if entry.receipt.status == "rejected"}
         self.site.journal.look()
         return values((
@@ -128,7 +128,7 @@ class Sites:
             [entry for i, entry in plan.ledger.entries.items() if i not in rejected],
             plan.ledger.changes, plan.ledger.versions, plan.ledger.stills, plan.ledger.undo_steps,
             plan.ledger.settled,
-            operator.log.count, operator.log.waiting, operator.newest_sent, operator.command_ids,
+            robot.log.count, robot.log.waiting, robot.newest_sent, robot.command_ids,
             operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal.edits),
             [deed for deed in self.notes.deeds if deed.receipt is None or deed.receipt.status != "rejected"],
         ))  # fmt: skip
@@ -138,10 +138,10 @@ class Sites:
         outcome = self.order(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND))
         assert outcome.receipt is not None, outcome.refusal
         self.lab.run(NOW + 1.0)
-        assert self.robot.engine.timeline == self.operator.engine.timeline
+        assert self.robot.engine.timeline == self.operator.robot.engine.timeline
         assert self.robot.engine.timeline.end == outcome.receipt.end
         assert self.operator.report is not None
-        assert self.operator.report.executed == self.operator.log.count
+        assert self.operator.report.executed == self.operator.robot.log.count
         assert not self.operator.halted
 
 
@@ -257,7 +257,7 @@ def test_whatever_raises_it_is_done_or_it_isnt(name: str) -> None:
     functions = called(lambda: reference.order(command))
     done = reference.state()
     sites = Sites(*before)
-    state, newest = sites.state(), sites.operator.engine.newest
+    state, newest = sites.state(), sites.operator.robot.engine.newest
     assert state != done
     assert len(functions) > 20
     tried = 0
@@ -288,7 +288,7 @@ def test_whatever_raises_it_is_done_or_it_isnt(name: str) -> None:
             else:
                 # Where a plan can't be, some commands go another way, and say so.
                 assert found == done or (outcome.receipt is not None and outcome.receipt.reason), where
-            if sites.operator.engine.newest != newest or not refused:
+            if sites.operator.robot.engine.newest != newest or not refused:
                 sites = Sites(*before)
     assert tried > 20
     sites.follows()
@@ -312,13 +312,13 @@ def test_a_command_that_cant_be_sent_isnt_taken() -> None:
 
 
 def test_a_command_that_no_robot_would_read_isnt_taken() -> None:
-    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
-    limits = operator.engine.limits
+    operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+    limits = operator.robot.engine.limits
     for value in (1e-320, [1.0, 1.0, 1.0, 1.0, 1.0, 1e-320]):
         with pytest.raises(InvalidValueError, match=r"at least 2\.23e-308"):
-            operator.engine.execute(ParameterChange("qd_max", value))
-    assert operator.engine.limits is limits
-    assert operator.log.count == 0
+            operator.robot.engine.execute(ParameterChange("qd_max", value))
+    assert operator.robot.engine.limits is limits
+    assert operator.robot.log.count == 0
 
 
 @pytest.mark.parametrize("told", ["commanded", "answered", "reported", "measured"])

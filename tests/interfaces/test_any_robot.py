@@ -43,12 +43,8 @@ PLAN = """{"title": "Lifting"}
 
 
 NAMES = re.compile(r"puma|\bipr\b|\bmicro\b|cubo", re.IGNORECASE)
-OF_ALL_BASES = re.compile(
-    r"\s*from robots\.ipr\.(camera|chassis|floor_plan|model|navigation|position|robot|shapes) import"
-)
-"""Modules of `robots.ipr` that are of any mobile robot, and bear its name only by where they lie."""
-STORED = '    body: Literal["ipr", "micro", "bare"]'
-"""What recordings of drives may be of: the schema stands in each file."""
+PAPERS = {"doulgeri", "han2001", "kim2002", "kim2006", "tipsuwan"}
+"""Folders of the laboratory: what they reproduce was done with one robot."""
 
 
 def test_no_shared_room_names_a_robot() -> None:
@@ -56,14 +52,14 @@ def test_no_shared_room_names_a_robot() -> None:
         path
         for path in sorted((HERE.parents[1] / "interfaces").rglob("*"))
         if path.suffix in {".py", ".js", ".html", ".css"}
-        and path.parts[len(HERE.parents[1].parts) + 1] not in {"val2", "lab"}
+        and not {"val2", *PAPERS} & set(path.relative_to(HERE.parents[1]).parts)
     ]
     assert len(shared) > 200
     found = [
         f"{path.relative_to(HERE.parents[1])}:{number}: {line.strip()}"
         for path in shared
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
-        if NAMES.search(line) and not OF_ALL_BASES.match(line) and line != STORED
+        if NAMES.search(line)
     ]
     assert found == []
 
@@ -227,7 +223,7 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
     ("arguments", "said"),
     [
         (("serve", "--robot", ARM, "--val-port", "0"), "val-port must be left out"),
-        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, exact"),
+        (("serve", "--robot", ARM, "--body", "jelly"), "body of crane must be one of swaying, ideal"),
         (("console", "--robot", ARM), "an arm of 6 joints that turn"),
         (("serve", "--robot", "micro", "--camera", "3"), "micro has nothing of the kind"),
         (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
@@ -273,23 +269,28 @@ def test_a_base_of_another_size_drives_in_the_laboratory(tmp_path: Path) -> None
     assert 0.1 < np.abs(drive.drives[:, 0]).max() <= own_base.LIMITS.v_max
     assert drive.limits_passed() == 0
     assert drive.compare().path_error_max < 0.05
-    vrs(
-        "lab",
-        "--robot",
-        BASE,
-        "--operator",
-        "slalom",
-        "--runs",
-        1,
-        "--length",
-        2,
-        "--workers",
-        1,
-        "--out",
-        tmp_path,
-    )
+
+
+def test_a_drive_of_a_base_of_another_size_is_recorded(tmp_path: Path) -> None:
+    one = "--architecture", "timeline", "--transport", "datagrams", "--runs", 1, "--length", 2, "--workers", 1
+    vrs("lab", "--robot", BASE, "--operator", "slalom", *one, "--record", "--out", tmp_path)
     with open(tmp_path / "runs.csv", newline="") as file:
-        assert {row["robot"] for row in csv.DictReader(file)} == {BASE}
+        (row,) = csv.DictReader(file)
+    assert row["robot"] == BASE
+    (path,) = (tmp_path / "runs").glob("*.mcap")
+    told = json.loads(vrs("compare", path, "--robot", BASE, "--json"))
+    assert "missing" not in told
+    assert told["robot"] == "cart"
+    for name in ("path_error_max", "time_difference_mean", "limits_passed"):
+        assert told[name] == pytest.approx(float(row[name]), rel=1e-5)
+    assert "identical" in vrs("replay", path, "--commands", "--robot", BASE)
+    shown = json.loads(vrs("replay", path, "--headless", "--at", 1.0, "--json", "--robot", BASE).splitlines()[-1])
+    assert len(shown["q_virtual"]) == len(shown["q_real"]) == 3
+    vrs("export", path, "--csv", tmp_path, "--report", tmp_path / "report.html", "--robot", BASE)
+    with open(tmp_path / "real.csv", newline="") as file:
+        assert {"x_m", "y_m", "theta_rad", "v_m_per_s"} <= next(csv.DictReader(file)).keys()
+    assert "cart" in (tmp_path / "report.html").read_text()
+    assert exit_status(["compare", str(path)]) == 2
 
 
 def test_a_base_without_shapes_is_a_box_where_it_stands() -> None:
@@ -301,8 +302,10 @@ def test_a_base_without_shapes_is_a_box_where_it_stands() -> None:
     assert pytest.approx([1.0, 3.0, 0.0, 1.0]) == X @ [1, 0, 0, 1]
 
 
-def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: Any) -> None:
-    with child("serve", "--port", "0", "--robot", BASE, "--room", "furnished", "--link-loss", "hold") as server:
+def test_a_base_of_another_size_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_page: Any) -> None:
+    path = tmp_path / "live.mcap"
+    where = "--room", "furnished", "--record", str(path), "--recordings", str(tmp_path)
+    with child("serve", "--port", "0", "--robot", BASE, "--link-loss", "hold", *where) as server:
         url = station(server)
         page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open(live=False)
         with connect_mobile(url.rstrip("/"), name="somebody", timeout=20.0) as robot:
@@ -317,5 +320,11 @@ def test_a_base_of_another_size_is_driven_live_and_seen_on_the_page(new_page: An
                 time.sleep(0.1)
             assert robot.wait(lambda it: it.postures.real.x > begun + 0.2, 30.0)
             assert not page.get("station.config.panels.some((panel) => panel.name === 'camera')")
+            page.wait("station.shared.record.now?.name === 'live.mcap'")
         assert page.errors == []
         page.page.context.close()
+    told = json.loads(vrs("compare", path, "--robot", BASE, "--json"))
+    assert told["robot"] == "cart"
+    assert told["path_error_max"] < 0.05
+    assert told["time_difference_mean"] > 0.0
+    assert "identical" in vrs("replay", path, "--commands", "--robot", BASE)

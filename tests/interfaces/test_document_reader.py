@@ -12,7 +12,7 @@ from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, 
 from interfaces.messages import Order, Request
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.codec import Encoding, decode, encode
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from tests.interfaces.document_reader import DocumentReader, Row
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop
@@ -31,13 +31,13 @@ class Session:
 
     def __init__(self, profile: str, D: float, loss: float, seed: int, length: float) -> None:
         self.rng = np.random.default_rng(seed)
-        operator = OperatorSite(MODEL, NOMINAL, now=0.0)
-        robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+        operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+        robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
         conditions = Conditions(
             delay=delay_profile(profile), loss=BernoulliLoss(loss), duplicate=0.05, service=Service.DATAGRAM
         )
         self.lab = Laboratory(operator, robot, LinkConditions.symmetric(conditions), self.rng)
-        self.site = Site(operator.engine)
+        self.site = Site(operator.robot.engine)
         self.servlet = self.site.servlet()
         self.reader = DocumentReader()
         self.reader.begin()
@@ -135,5 +135,5 @@ def check(session: Session) -> None:
 def test_a_reader_by_the_document_has_the_servers_timeline_after_every_edit(profile, D, loss, seed):
     session = Session(profile, D, loss, seed, length=12.0)
     check(session)
-    assert len(session.lab.operator.corrections) > 8
+    assert len(session.lab.operator.robot.corrections) > 8
     assert session.checked > 380

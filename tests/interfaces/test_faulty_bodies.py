@@ -160,7 +160,7 @@ def spoilt(bad: Any, j: int = 2) -> Callable[[Any], Any]:
 def test_a_site_uses_no_bad_sample_brakes_if_they_last_and_goes_on_by_resume(bad: Any, watchdog: Any) -> None:
     ends = Spoilt(RobotSiteConfig(watchdog=watchdog))
     ends.go()
-    ends.operator.execute(to(READY, speed=0.3), now=ends.now)
+    ends.operator.robot.execute(to(READY, speed=0.3), now=ends.now)
     ends.run(0.5)
     ends.spoil = spoilt(bad)
     ends.run(STEP)
@@ -180,28 +180,28 @@ def test_a_site_uses_no_bad_sample_brakes_if_they_last_and_goes_on_by_resume(bad
     stood = ends.asked[-1][0]
     # A resume while the sensor is still bad stops at once.
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(READY, speed=0.3), now=ends.now)
+    ends.operator.robot.execute(to(READY, speed=0.3), now=ends.now)
     ends.run(1.5)
     assert ends.operator.halted
     assert np.abs(ends.asked[-1][0] - stood).max() < 0.05
     ends.spoil = lambda q: q
     ends.run(2.0)
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
     assert (site.halted, site.violation) == ("", None)
     ends.check()
     q = np.array([report.q for report in ends.reports])
     assert (np.abs(q) < 10).all()
-    assert np.isfinite(ends.operator.engine.timeline.sample(np.linspace(0, ends.now, 500))).all()
+    assert np.isfinite(ends.operator.robot.engine.timeline.sample(np.linspace(0, ends.now, 500))).all()
 
 
 @pytest.mark.parametrize("watchdog", [None, WatchdogConfig()])
 def test_a_joint_that_seizes_is_a_typed_abort_and_the_arm_goes_on_once_it_is_free(watchdog: Any) -> None:
     ends = Spoilt(RobotSiteConfig(watchdog=watchdog))
     ends.go()
-    ends.operator.execute(to(READY, speed=0.5), now=ends.now)
+    ends.operator.robot.execute(to(READY, speed=0.5), now=ends.now)
     ends.run(0.3)
     seized = ends.asked[-1][0][1]
     ends.spoil = lambda q: np.where(np.arange(6) == 1, seized, q)
@@ -220,7 +220,7 @@ def test_a_joint_that_seizes_is_a_typed_abort_and_the_arm_goes_on_once_it_is_fre
     assert ends.asked[-1][0][1] == pytest.approx(seized, abs=1e-9)
     ends.spoil = lambda q: q
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
     assert site.violation is None

@@ -12,7 +12,7 @@ from interfaces.runtime.physics import Feeder
 from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import TickLoop
-from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine
+from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from robots.robot import ExactArm
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
@@ -27,9 +27,8 @@ class Site:
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
-        self.operator = OperatorSite(
-            MODEL, NOMINAL, now=0.0, halted=Halt(HaltCause.NOT_MET, "no robot has come yet")
-        )
+        halted = Halt(HaltCause.NOT_MET, "no robot has come yet")
+        self.operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0), halted=halted)
         link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.003")))
         self.line = RobotLine(self.operator, link, np.random.default_rng(seed))
         self.line.connected = True
@@ -64,7 +63,9 @@ class Site:
                 self.operator.resume(now=t)
             elif t >= moves:
                 q = np.clip(NOMINAL + rng.uniform(-0.8, 0.8, 6), LIMITS.q_min, LIMITS.q_max)
-                self.operator.execute(MotionCommand(JointTarget(q), None, None, rng.choice([0.3, 0.6, 1.0])), now=t)
+                self.operator.robot.execute(
+                    MotionCommand(JointTarget(q), None, None, rng.choice([0.3, 0.6, 1.0])), now=t
+                )
                 moves = t + rng.exponential(1.0)
             if t >= says:
                 waiting += self.line.advance(now=t)

@@ -9,7 +9,7 @@ import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.sites import Orders
-from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
 from robots.onboard import LossPolicy, WatchdogConfig
@@ -50,9 +50,8 @@ class Ends:
 
     def new_operator(self, session: str, link_loss: LossPolicy | None = None) -> None:
         self.began, self.session = self.t, session
-        self.operator = OperatorSite(
-            MODEL, NOMINAL, now=0.0, halted=Halt(HaltCause.NOT_MET, "no robot has come yet")
-        )
+        halted = Halt(HaltCause.NOT_MET, "no robot has come yet")
+        self.operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0), halted=halted)
         self.line = RobotLine(self.operator, self.conditions, np.random.default_rng(3))
         self.line.connected = True
         self.refused = self.host.hello(session, now=self.robots(), link_loss=link_loss)
@@ -99,19 +98,19 @@ def to(q: Array, **options: object) -> MotionCommand:
 
 def test_they_meet_move_and_agree() -> None:
     ends = Ends()
-    refused = ends.operator.execute(to(READY), now=0.0)
+    refused = ends.operator.robot.execute(to(READY), now=0.0)
     assert "no robot has come yet" in refused.reason
     assert ends.operator.resume(now=0.0) != ""
     ends.go()
-    ends.operator.execute(to(READY, execute_at=ends.now + 0.2), now=ends.now)
+    ends.operator.robot.execute(to(READY, execute_at=ends.now + 0.2), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-12
     site = ends.host.site
     assert site is not None
     assert not site.parted
     t = np.linspace(3.0, ends.now, 100)
-    assert np.array_equal(site.engine.timeline.sample(t), ends.operator.engine.timeline.sample(t))
-    assert not ends.operator.corrections
+    assert np.array_equal(site.engine.timeline.sample(t), ends.operator.robot.engine.timeline.sample(t))
+    assert not ends.operator.robot.corrections
     assert ends.host.uncertainty <= 0.06
     ends.check()
 
@@ -123,12 +122,12 @@ def test_a_command_at_the_very_first_moment_is_carried_out_as_planned(delay: str
     while ends.operator.resume(now=ends.now):
         ends.run(STEP)
         assert ends.t < 30.0
-    answer = ends.operator.execute(to(READY), now=ends.now)
+    answer = ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(20.0)
-    assert ends.operator.receipts[1].execute_at == answer.execute_at
+    assert ends.operator.robot.receipts[1].execute_at == answer.execute_at
     assert ends.host.site is not None
     assert not ends.host.site.parted
-    assert not ends.operator.corrections
+    assert not ends.operator.robot.corrections
     ends.check()
 
 
@@ -137,7 +136,7 @@ def test_the_operators_site_knows_what_time_and_the_body_cost() -> None:
     ends.go()
     ends.line.messages()
     began = ends.now
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     heard = 0
     for _ in range(30):
         ends.run(0.1)
@@ -171,10 +170,10 @@ def test_what_is_due_as_a_message_comes_is_sent(delay: str) -> None:
 def test_a_robot_that_stands_elsewhere_is_met_where_it_stands() -> None:
     ends = Ends(q=READY)
     ends.run(12.0)
-    assert len(ends.operator.corrections) == 1
-    assert np.abs(ends.operator.engine.timeline.sample(ends.now) - READY).max() <= 1e-9
+    assert len(ends.operator.robot.corrections) == 1
+    assert np.abs(ends.operator.robot.engine.timeline.sample(ends.now) - READY).max() <= 1e-9
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(NOMINAL), now=ends.now)
+    ends.operator.robot.execute(to(NOMINAL), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - NOMINAL).max() <= 1e-9
     ends.check()
@@ -183,7 +182,7 @@ def test_a_robot_that_stands_elsewhere_is_met_where_it_stands() -> None:
 def test_a_robot_that_starts_anew_waits_for_a_resume() -> None:
     ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig()))
     ends.go()
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(0.6)
     ends.run(1.5, robot=False)
     ends.host, ends.asked = ends.robot(NOMINAL), []
@@ -191,9 +190,9 @@ def test_a_robot_that_starts_anew_waits_for_a_resume() -> None:
     ends.run(15.0)
     assert ends.operator.halted
     assert np.abs(np.array(ends.asked)[:, 0] - NOMINAL).max() == 0.0
-    assert np.abs(ends.operator.engine.timeline.sample(ends.now) - NOMINAL).max() <= 1e-9
+    assert np.abs(ends.operator.robot.engine.timeline.sample(ends.now) - NOMINAL).max() <= 1e-9
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
     ends.check()
@@ -203,7 +202,7 @@ def test_a_robot_that_starts_anew_waits_for_a_resume() -> None:
 def test_without_its_operator_the_robot_stops_in_time_and_takes_the_next(moving_for: float) -> None:
     ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))
     ends.go()
-    ends.operator.execute(to(READY), now=ends.now)
+    ends.operator.robot.execute(to(READY), now=ends.now)
     ends.run(moving_for)
     ends.new_operator("second")
     assert "another" in ends.refused
@@ -219,7 +218,7 @@ def test_without_its_operator_the_robot_stops_in_time_and_takes_the_next(moving_
     assert ends.refused == ""
     ends.run(15.0)
     assert ends.operator.resume(now=ends.now) == ""
-    ends.operator.execute(to(NOMINAL), now=ends.now)
+    ends.operator.robot.execute(to(NOMINAL), now=ends.now)
     ends.run(6.0)
     assert np.abs(ends.asked[-1][0] - NOMINAL).max() <= 1e-9
     ends.check()
@@ -229,12 +228,16 @@ def test_nothing_of_a_pause_is_made_up_for_in_a_burst() -> None:
     ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig()))
     ends.go()
     for _ in range(40):
-        ends.operator.execute(SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now)
+        ends.operator.robot.execute(
+            SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now
+        )
         ends.run(0.02)
     ends.run(5.0, operator=False)
     stood = ends.asked[-1][0]
     for _ in range(40):
-        ends.operator.execute(SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now)
+        ends.operator.robot.execute(
+            SteerCommand(rates=0.3 * LIMITS.qd_max * np.array([1, 0, 0, 0, 0, 1])), now=ends.now
+        )
         ends.run(0.02)
     assert np.abs(ends.asked[-1][0] - stood).max() == 0.0
     assert ends.operator.halted
@@ -247,11 +250,11 @@ def test_held_links_of_the_paper(delay: str) -> None:
     ends.run(6.0)
     assert ends.operator.resume(now=ends.now) == ""
     for q in (READY, NOMINAL, READY):
-        ends.operator.execute(to(q), now=ends.now)
+        ends.operator.robot.execute(to(q), now=ends.now)
         ends.run(3.0)
     ends.run(20.0)
     assert np.abs(ends.asked[-1][0] - READY).max() <= 1e-9
-    assert not ends.operator.corrections
+    assert not ends.operator.robot.corrections
     ends.check()
 
 
@@ -266,10 +269,10 @@ def test_what_is_decided_ahead_stops_as_early_as_was_promised() -> None:
 
 def test_it_cant_be_resumed_while_the_virtual_robot_is_put_where_the_real_one_is() -> None:
     ends = Ends(q=READY)
-    while not ends.operator.corrections:
+    while not ends.operator.robot.corrections:
         ends.run(STEP)
     assert "is being put where the real one is" in ends.operator.resume(now=ends.now)
-    ends.run(ends.operator.corrections[-1].end - ends.now + STEP)
+    ends.run(ends.operator.robot.corrections[-1].end - ends.now + STEP)
     assert ends.operator.resume(now=ends.now) == ""
 
 
@@ -278,7 +281,7 @@ def test_who_comes_next_is_followed_once_the_body_stands() -> None:
     ends = Ends(site=RobotSiteConfig(fixed_offset=-0.1))
     ends.go()
     far = NOMINAL + np.array([2.4, 0.0, 0.0, 0.0, 0.0, 0.0])
-    ends.operator.execute(to(far, speed=0.5), now=ends.now)
+    ends.operator.robot.execute(to(far, speed=0.5), now=ends.now)
     ends.run(0.5)
     ends.run(2.1, operator=False)
     assert np.abs(ends.asked[-1][1]).max() > 0.5

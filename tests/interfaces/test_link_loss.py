@@ -16,7 +16,7 @@ from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import RobotSiteConfig
 from robots.onboard import LossPolicy, WatchdogConfig
 from tests.interfaces.live_rig import Child, child
-from tests.interfaces.teleop.driving.rig import Rig
+from tests.interfaces.teleop.rig import Rig
 from tests.interfaces.test_host import Ends
 
 SOON = 40.0

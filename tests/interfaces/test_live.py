@@ -17,7 +17,7 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.control import Lease
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.connection import Connection
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from tests.interfaces.live_rig import (
     HALT,
     MODEL,
@@ -81,7 +81,7 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
             operator_here(url, delay=f"constant:{delay}") as (operator, at),
         ):
             receipts, begin = await asyncio.to_thread(play, at)
-            mine, theirs = operator.operator.engine, robot.host.site
+            mine, theirs = operator.operator.robot.engine, robot.host.site
             assert theirs is not None
             late = max(operator.health()["timer_late"], robot.health()["timer_late"])
             assert not theirs.parted or late > MARGIN
@@ -93,15 +93,15 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
     made = next((made for made in (asyncio.run(live()) for _ in range(4)) if made is not None), None)
     assert made is not None
     receipts, begin, virtual, real, answers = made
-    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(fixed_offset=D))
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(f"constant:{delay}")))
     lab = Laboratory(operator, robot, link, np.random.default_rng(0))
     for t, command in script(begin):
-        lab.schedule(t, lambda now, command=command: operator.execute(command, now=now))  # type: ignore[misc]
+        lab.schedule(t, lambda now, command=command: operator.robot.execute(command, now=now))  # type: ignore[misc]
     lab.run(begin + 8.0)
     there = [r for r in robot.engine.receipts if r.command_id <= 5]
-    for seen, expected in ((receipts, operator.engine.receipts), (answers, there)):
+    for seen, expected in ((receipts, operator.robot.engine.receipts), (answers, there)):
         assert len(seen) == len(expected) == 5
         for one, other in zip(seen, expected, strict=True):
             assert (one.command_id, one.status, one.reason) == (other.command_id, other.status, other.reason)
@@ -109,7 +109,7 @@ def test_a_script_is_the_same_live_and_in_the_laboratory() -> None:
             assert one.end == pytest.approx(other.end, abs=1e-9)
             assert (one.shifted, one.superseded) == (other.shifted, other.superseded)
     t = np.linspace(begin, begin + 8.0, 4001)
-    for timeline, other in ((virtual, operator.engine.timeline), (real, robot.engine.timeline)):
+    for timeline, other in ((virtual, operator.robot.engine.timeline), (real, robot.engine.timeline)):
         assert np.abs(timeline.sample(t) - other.sample(t)).max() <= 1e-9
 
 

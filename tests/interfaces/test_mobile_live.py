@@ -25,7 +25,7 @@ from interfaces.messages.jobs import (
     WaitJob,
 )
 from interfaces.messages.mobile import Tasks
-from interfaces.runtime.live.mobile_operator import LiveMobileOperator, LiveMobileOperatorConfig
+from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.runtime.live.physics_body import PhysicsBody
 from interfaces.runtime.live.robot import LiveBody, LiveRobot
@@ -34,15 +34,15 @@ from interfaces.runtime.physics import PhysicsConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.client_socket import UnreachableError
-from interfaces.stream.connection import MobileConnection
+from interfaces.stream.connection import Connection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
-from interfaces.teleop.driving import DrivenConfig
+from interfaces.teleop.following_base import DrivenConfig
 from robots import load
 from robots.bullet.rooms import EMPTY
-from robots.ipr.robot import place
+from robots.mobile.robot import place
 from robots.onboard.journey import Goal, JourneyState
-from robots.robot import EXACT
+from robots.robot import IDEAL
 from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
@@ -70,8 +70,8 @@ async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     async with listening(LiveRobot(PacedBody(config), Access(free={Role.SITE}))) as url:
         at = sockets.bind("127.0.0.1", 0)
         own = at.getsockname()[1]
-        operator = LiveMobileOperator(
-            LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions(), jobs=JobFile(jobs)),
+        operator = LiveOperator(
+            LiveOperatorConfig(ROBOT, url, LinkConditions(), room=ROOM, jobs=JobFile(jobs)),
             Access(free=OPEN),
         )
         app = application(operator.routes, hosts(["127.0.0.1"], own))
@@ -79,17 +79,17 @@ async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
             yield Serving(own)
 
 
-def met(url: str, name: str) -> MobileConnection:
+def met(url: str, name: str) -> Connection:
     """A connection whose robot has been met."""
     robot = connect_mobile(url, name=name, timeout=20.0)
     assert robot.wait(lambda it: it.postures is not None and it.postures.real is not None, 30.0)
     return robot
 
 
-def controlled(robot: MobileConnection) -> None:
+def controlled(robot: Connection) -> None:
     """Have control, with a drive begun or jobs going on."""
 
-    def has(_: MobileConnection) -> bool:
+    def has(_: Connection) -> bool:
         answer = robot.acquire()
         return isinstance(answer, Lease) and answer.yours
 
@@ -180,10 +180,10 @@ def test_an_operator_takes_no_other_robot_and_no_other_room(other: str) -> None:
             body = PacedBody(PacedConfig(ROBOT, place("lane")))
         else:
             arm = load("puma560")
-            body = PhysicsBody(PhysicsConfig(arm, arm.arm.poses["ready"], EXACT))
+            body = PhysicsBody(PhysicsConfig(arm, arm.arm.poses["ready"], IDEAL))
         async with listening(LiveRobot(body, Access(free={Role.SITE}))) as url:
-            config = LiveMobileOperatorConfig(ROBOT, ROOM, url, LinkConditions())
-            async with LiveMobileOperator(config, Access(free=OPEN)).running() as operator, asyncio.timeout(20.0):
+            config = LiveOperatorConfig(ROBOT, url, LinkConditions(), room=ROOM)
+            async with LiveOperator(config, Access(free=OPEN)).running() as operator, asyncio.timeout(20.0):
                 while "driven here" not in operator.robot.problem:
                     await asyncio.sleep(0.02)
                 assert not operator.robot.connected

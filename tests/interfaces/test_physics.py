@@ -29,8 +29,8 @@ from interfaces.runtime.physics_messages import (
     decode_news,
 )
 from interfaces.runtime.physics_process import ParentSocket, tick_body
-from interfaces.teleop import JointReference, RobotSite
-from robots.robot import EXACT
+from interfaces.teleop import FollowingArm, JointReference
+from robots.robot import IDEAL
 from tests.interfaces.test_teleop import laboratory
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, ROBOT, TICK, motion, sampled, standing
 from vrs import Engine, JointTarget, MotionCommand, Timeline, WallClock
@@ -45,7 +45,7 @@ def motion_from(q: Array, target: Array | None = None) -> Timeline:
     return engine.timeline
 
 
-def foreseen(site: RobotSite) -> Callable[[Array], JointReference]:
+def foreseen(site: FollowingArm) -> Callable[[Array], JointReference]:
     return lambda t: site.reference(site.foreseen(t))
 
 
@@ -77,7 +77,7 @@ def test_what_a_site_foresees_is_what_it_finds_after_a_stall(profile: str, D: fl
 
 
 def configured(**options: Any) -> PhysicsConfig:
-    return PhysicsConfig(ROBOT, NOMINAL, **({"body": EXACT} | options))
+    return PhysicsConfig(ROBOT, NOMINAL, **({"body": IDEAL} | options))
 
 
 def wait(physics: PhysicsProcess, clock: WallClock, until: Callable[[Event], bool], longest: float) -> list[Event]:
@@ -185,7 +185,7 @@ from robots import load
 from vrs.clock import WallClock
 robot = load("puma560")
 q, clock = np.array(robot.arm.poses["nominal"]), WallClock(0.0)
-physics = PhysicsProcess(PhysicsConfig(robot, q, body="exact"), clock)
+physics = PhysicsProcess(PhysicsConfig(robot, q, body="ideal"), clock)
 while not any(isinstance(e, PhysicsReady) for e in physics.poll(now=clock.now())):
     select.select([physics], [], [], 1.0)
 first, h = int(clock.now() / TICK) + 200, TICK * np.arange(1000)[:, None] * np.ones(6)
@@ -285,7 +285,7 @@ def test_it_refuses_what_can_not_be_sent(clock: WallClock) -> None:
 
 
 def test_a_site_at_rest_asks_for_one_row() -> None:
-    references = References(foreseen(RobotSite(MODEL, NOMINAL, now=0.0)), now=0.0205)
+    references = References(foreseen(FollowingArm(MODEL, NOMINAL, now=0.0)), now=0.0205)
     first, reference = references.take(now=0.0205)
     assert first == 21
     assert np.array_equal(reference.q, NOMINAL[None])
@@ -294,4 +294,4 @@ def test_a_site_at_rest_asks_for_one_row() -> None:
     references.restart(now=0.06)
     assert references.take(now=0.07)[0] == 61
     with pytest.raises(InvalidValueError, match="horizon"):
-        References(foreseen(RobotSite(MODEL, NOMINAL, now=0.0)), now=0.0, horizon=0.6)
+        References(foreseen(FollowingArm(MODEL, NOMINAL, now=0.0)), now=0.0, horizon=0.6)

@@ -10,7 +10,7 @@ import pytest
 from interfaces.link import BernoulliLoss, Conditions, LinkConditions, Service, delay_profile
 from interfaces.messages.sites import Orders
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from robots.onboard import WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
@@ -23,16 +23,16 @@ SERVICES = (Service.DATAGRAM, Service.IN_ORDER)
 
 def sites(delay: str, *, loss: float = 0.0, service: Service = Service.DATAGRAM, halts: bool = False) -> Laboratory:
     conditions = Conditions(delay=delay_profile(delay), loss=BernoulliLoss(loss), service=service)
-    robot = RobotSite(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=HALT if halts else None))
-    operator = OperatorSite(MODEL, NOMINAL, now=0.0)
+    robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=HALT if halts else None))
+    operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     return Laboratory(operator, robot, LinkConditions.symmetric(conditions), np.random.default_rng(1))
 
 
 def move(lab: Laboratory, q: np.ndarray, *, now: float) -> None:
-    lab.schedule(now, lambda t: lab.operator.execute(MotionCommand(JointTarget(q)), now=t))
+    lab.schedule(now, lambda t: lab.operator.robot.execute(MotionCommand(JointTarget(q)), now=t))
 
 
-def never_hears(robot: RobotSite, missing: int) -> None:
+def never_hears(robot: FollowingArm, missing: int) -> None:
     """Let an entry of the first epoch get lost between the link and the robot, however often it's sent."""
     receive = robot.receive
 
@@ -58,7 +58,7 @@ def test_a_robot_that_waits_for_ever_is_halted_and_resuming_mends_it(delay, halt
     operator, robot = lab.operator, lab.robot
     assert "hasn't carried out" in operator.halted.text
     assert "hasn't carried out" in robot.halted
-    assert operator.engine.execute(MotionCommand(JointTarget(READY))).status == "rejected"
+    assert operator.robot.engine.execute(MotionCommand(JointTarget(READY))).status == "rejected"
     lab.run(lab.now + 15.0)
     assert operator.resume(now=lab.now) == ""
     move(lab, READY, now=lab.now + 0.1)
@@ -129,7 +129,9 @@ def test_an_outage_while_somebody_steers_is_no_halt(delay, service):
     down = replace(up.forward, loss=BernoulliLoss(1.0), service=Service.DATAGRAM)
     for k in range(5):
         for j in range(50):
-            lab.schedule(lab.now + 0.02 * j, lambda t: lab.operator.execute(SteerCommand(rates=[0.1] * 6), now=t))
+            lab.schedule(
+                lab.now + 0.02 * j, lambda t: lab.operator.robot.execute(SteerCommand(rates=[0.1] * 6), now=t)
+            )
         # Reports still come at first.
         lab.link.change(LinkConditions(down, up.backward), lab.now)
         lab.run(lab.now + 1.0)
@@ -137,9 +139,9 @@ def test_an_outage_while_somebody_steers_is_no_halt(delay, service):
         lab.run(lab.now + 3.0 + 0.213 * k)
         lab.link.change(up, lab.now)
         end = lab.now + 60.0
-        while lab.now < end and (report is None or report.executed < lab.operator.log.count):
+        while lab.now < end and (report is None or report.executed < lab.operator.robot.log.count):
             lab.run(lab.now + 1.0)
             report = lab.operator.report
         assert not lab.operator.halted
         assert report is not None
-        assert report.executed == lab.operator.log.count == 50 * (k + 1)
+        assert report.executed == lab.operator.robot.log.count == 50 * (k + 1)

@@ -11,6 +11,7 @@ from interfaces.messages.fields import MOST_NAMES
 from interfaces.stream import Encoding, decode, encode
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from tests.interfaces.joined import MODEL, to
 from vrs import Engine, Insertion, ManualClock, PositionQuery
 
@@ -25,18 +26,18 @@ def outcome(servlet: Servlet, number: int, command: object) -> Outcome:
 
 
 def test_what_a_halted_robot_refuses_has_a_code_that_clients_are_told() -> None:
-    site = OperatorSite(MODEL, READY, now=0.0, halted=Halt(HaltCause.REPORTED, "nothing fresh came"))
-    refused = outcome(Servlet(site.engine), 1, to(1))
+    site = OperatorSite(VirtualArm(MODEL, READY, now=0.0), halted=Halt(HaltCause.REPORTED, "nothing fresh came"))
+    refused = outcome(Servlet(site.robot.engine), 1, to(1))
     assert refused.receipt is not None
     assert refused.receipt.reason == "the robot doesn't follow: nothing fresh came; resume first"
     assert refused.code is RefusalCode.NOT_FOLLOWING
-    issued = Designer(site.engine).issue(to(1), now=0.0)
+    issued = Designer(site.robot.engine).issue(to(1), now=0.0)
     assert issued.code is RefusalCode.NOT_FOLLOWING
-    assert site.engine.refusal(refused.receipt.command_id) is RefusalCode.NOT_FOLLOWING
+    assert site.robot.engine.refusal(refused.receipt.command_id) is RefusalCode.NOT_FOLLOWING
 
 
 def test_what_the_engine_rejects_or_does_has_none() -> None:
-    servlet = Servlet(OperatorSite(MODEL, READY, now=0.0).engine)
+    servlet = Servlet(OperatorSite(VirtualArm(MODEL, READY, now=0.0)).robot.engine)
     for number, command in enumerate(
         (to(1), to(1, execute_at=-1.0, issued_at=0.0), PositionQuery(), None), start=1
     ):
@@ -44,7 +45,7 @@ def test_what_the_engine_rejects_or_does_has_none() -> None:
 
 
 def test_a_servlet_passes_on_why_an_order_is_not_admitted() -> None:
-    engine = OperatorSite(MODEL, READY, now=0.0).engine
+    engine = OperatorSite(VirtualArm(MODEL, READY, now=0.0)).robot.engine
     servlet = Servlet(engine, admit=lambda _: Refusal("not now", RefusalCode.OVERRULED))
     refused = outcome(servlet, 1, to(1))
     assert (refused.refusal, refused.code, engine.newest) == ("not now", RefusalCode.OVERRULED, 0)

@@ -21,9 +21,9 @@ from interfaces.runtime.physics_process import tick_body
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.stream.access import Access
 from interfaces.teleop import RobotSiteConfig
-from interfaces.teleop.driving import DrivenConfig
+from interfaces.teleop.following_base import DrivenConfig
 from robots import load, onboard
-from robots.ipr.robot import place
+from robots.mobile.robot import place
 from robots.onboard import WatchdogConfig
 from tests.interfaces.live_rig import HALT, MODEL, NOMINAL, operator_here, robot_here, until
 
@@ -72,8 +72,8 @@ def test_the_document_names_what_there_is() -> None:
     titles = list(diagrams().values())
     assert len(titles) == 3
     assert {"HubSession", "Leasing", "Lease"} <= titles[0]
-    assert {"RobotHost", "RobotSite", "Watchdog", "SensorMonitor", "Engine", "TickLoop", *FUNCTIONS} <= titles[1]
-    assert {"DrivenRobot", "Watchdog", "SoundPosition", "SensorWatch"} <= titles[2]
+    assert {"RobotHost", "FollowingArm", "Watchdog", "SensorMonitor", "Engine", "TickLoop", *FUNCTIONS} <= titles[1]
+    assert {"FollowingBase", "Watchdog", "SoundPosition", "SensorWatch"} <= titles[2]
 
 
 def test_what_the_diagrams_show_runs() -> None:
@@ -95,7 +95,7 @@ def test_what_the_diagrams_show_runs() -> None:
     assert serve - operators == set()
     # The body's process makes its loop so.
     limits = tuple(map(tuple, (MODEL.limits.q_min, MODEL.limits.q_max, *[MODEL.limits.qd_max] * 3)))
-    setup = PhysicsSetup("", "exact", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
+    setup = PhysicsSetup("", "ideal", True, 0.001, 10, 0.0, 1, tuple(NOMINAL), limits)  # type: ignore[arg-type]
     with tick_body(setup) as body:
         loop = TickLoop(body, MODEL.limits, tuple(NOMINAL), tick=0.001, every=10, now=0.0)
         in_process = reachable([loop])

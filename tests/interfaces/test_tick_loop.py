@@ -28,7 +28,7 @@ from interfaces.runtime.physics_messages import (
 from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import AHEAD_MOST, PAUSE, TickLoop
 from interfaces.teleop import JointReference
-from robots.robot import EXACT, ExactArm
+from robots.robot import IDEAL, ExactArm
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK, motion, sampled, standing
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Status
 from vrs.errors import FormatError, InvalidValueError, VrsError
@@ -283,7 +283,7 @@ def test_what_makes_no_sense_brings_it_to_rest() -> None:
         Rows(0, 420, False, bytes(143)),
         Rows(0, 420, False, bytes(145)),
         Rows(0, 420, False, bytes(144 * (ROWS_MOST + 1))),
-        PhysicsSetup("", EXACT, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
+        PhysicsSetup("", IDEAL, True, TICK, 1, 0.0, 1, (), ((), (), (), (), ())),
         Attach(-1.0),
     ):
         bench = Bench(Picky())

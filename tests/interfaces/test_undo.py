@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from interfaces.engine_server.site import Site
 from interfaces.messages import Order
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
 from vrs import JointTarget, MotionCommand
@@ -19,12 +19,12 @@ class Hand:
     """A client of an operator's site."""
 
     def __init__(self) -> None:
-        self.operator = OperatorSite(MODEL, NOMINAL, now=0.0)
-        self.servlet = Site(self.operator.engine).servlet()
+        self.operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+        self.servlet = Site(self.operator.robot.engine).servlet()
         self.number = 0
 
     def order(self, command, now):
-        self.operator.clock.set(now)
+        self.operator.robot.clock.set(now)
         self.number += 1
         self.servlet.receive(Order(self.number, command, 1), now=now)
         return self.servlet.advance(now=now)[-1]
@@ -34,20 +34,20 @@ def test_a_deleted_move_comes_back_however_long_ago():
     hand = Hand()
     hand.order(MotionCommand(JointTarget(READY), execute_at=30.0), 1.0)
     hand.order(Cancel(1), 5.0)
-    assert hand.operator.engine.timeline.end < 30.5
+    assert hand.operator.robot.engine.timeline.end < 30.5
     outcome = hand.order(None, 20.0)
     assert (outcome.refusal, outcome.receipt.undone) == ("", False)
-    assert hand.operator.engine.timeline.end > 30.5
+    assert hand.operator.robot.engine.timeline.end > 30.5
 
 
 def test_after_a_correction_it_says_why_nothing_is_taken_back():
     hand = Hand()
     hand.order(MotionCommand(JointTarget(READY), execute_at=30.0), 1.0)
-    truth = Engine(MODEL, timeline=hand.operator.engine.timeline, clock=hand.operator.clock)
+    truth = Engine(MODEL, timeline=hand.operator.robot.engine.timeline, clock=hand.operator.robot.clock)
     hand.order(Cancel(1), 5.0)
     # The robot heard of the deletion too late, and goes.
-    hand.operator.clock.set(6.0)
-    hand.operator.engine.anchor(truth.timeline)
+    hand.operator.robot.clock.set(6.0)
+    hand.operator.robot.engine.anchor(truth.timeline)
     outcome = hand.order(None, 7.0)
     assert outcome.receipt is None
     assert outcome.refusal.startswith("the plan was put right at 6 s")

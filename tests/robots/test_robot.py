@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import robots
-from robots.robot import EXACT, FOUND, Display, Gripper, HeadCamera, Robot, ThinClient
+from robots.robot import EXACT, FOUND, IDEAL, Display, Gripper, HeadCamera, Robot, ThinClient
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import MobileModel
 from vrs.model import RobotModel
@@ -53,18 +53,22 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     robot = robots.load("puma560")
     q = robot.arm.poses["ready"]
     still = np.tile(q, (20, 1)), np.zeros((20, 6)), np.zeros((20, 6))
-    for name in ("bullet", EXACT):
+    for name in ("bullet", IDEAL):
         with robot.body(name)(q, friction=False) as body:
             body.attach(2.5)
             measured = body.follow(body.prepare(*still))
             body.release()
         assert measured.q.shape == (20, 6)
-        assert np.abs(measured.q - q).max() == pytest.approx(0.0 if name == EXACT else 1e-3, abs=1e-3)
+        assert np.abs(measured.q - q).max() == pytest.approx(0.0 if name == IDEAL else 1e-3, abs=1e-3)
     assert robot.usual_body == "bullet"
     assert robot.body() is robot.bodies["bullet"]
-    assert Robot("bare", robot.model).usual_body == EXACT
-    with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, exact; given: 'jelly'"):
+    assert Robot("bare", robot.model).usual_body == IDEAL
+    with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, ideal; given: 'jelly'"):
         robot.body("jelly")
+    assert robot.body_name(EXACT) == robot.body_name(IDEAL) == IDEAL
+    assert robot.body(EXACT) is robot.body(IDEAL)
+    with pytest.raises(InvalidValueError, match="one of bullet, bare"):
+        robots.load("ipr").body(EXACT)
 
 
 def test_ones_own_robot_lies_in_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

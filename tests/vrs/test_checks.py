@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from vrs.checks import check_fields, validated, within
+from vrs.checks import at_least, check_fields, positive, validated, within
 from vrs.errors import InvalidValueError
 
 
@@ -21,6 +21,9 @@ class Pace:
     count: Annotated[int, within(1, 5)] = 1
     limit: Annotated[float, within(0.0, 1.0)] | None = None
     smooth: bool = True
+    gain: Annotated[float, positive()] = 1.0
+    wait: Annotated[float, at_least(0.0, "finite seconds ≥ 0")] = 0.0
+    steps: Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=3)] = (1,)
     name: str = ""
     notes: list[str] = field(default_factory=list)
 
@@ -42,6 +45,7 @@ def test_what_is_in_range_is_kept_numbers_as_floats():
     assert pace.notes == ["own check ran"]
     assert Pace(period=0.1).period == 0.1
     assert Pace(period=10.0).period == 10.0
+    assert (Pace(gain=5e-324).gain, Pace(wait=0).wait, Pace(steps=(1, 2, 3)).steps) == (5e-324, 0.0, (1, 2, 3))
 
 
 @pytest.mark.parametrize(
@@ -60,6 +64,12 @@ def test_what_is_in_range_is_kept_numbers_as_floats():
         ("limit", -0.1, r"a number in \[0, 1\]"),
         ("smooth", 1, "True or False"),
         ("smooth", None, "True or False"),
+        ("gain", 0, "a positive number"),
+        ("gain", math.inf, "a positive number"),
+        ("wait", -1e-9, "finite seconds ≥ 0"),
+        ("wait", math.nan, "finite seconds ≥ 0"),
+        ("steps", (), "1 to 3"),
+        ("steps", (1, 2, 3, 4), "1 to 3"),
     ],
 )
 def test_what_is_not_is_refused_with_what_is_allowed(name, value, allowed):

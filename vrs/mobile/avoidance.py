@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import asin, ceil, copysign, pi
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.checks import finite
+from vrs.checks import positive, validated
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid, cast
 from vrs.mobile.model import DriveLimits, braking, clipped, limited, on_arcs, wrapped
@@ -38,30 +39,28 @@ _TOUCH = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Avoidance:
     """What keeps the virtual robot out of occupied cells: a function of where it is and what is asked."""
 
     limits: DriveLimits
     """Limits of its commands."""
-    radius: float
+    radius: Annotated[float, positive()]
     """Of the circle about the reference point that must stay free [m]; the robot's own, with whatever margin."""
-    period: float = 0.1
+    period: Annotated[float, positive()] = 0.1
     """T: time between commands [s]."""
     sectors: int = 72
     """Directions that are looked in, all around: 5 deg each, as in the source."""
-    notice: float = 1.0
+    notice: Annotated[float, positive()] = 1.0
     """How far ahead a sector must be free, beyond the radius, not to count as blocked [m]."""
-    look_ahead: float = 1.0
+    look_ahead: Annotated[float, positive()] = 1.0
     """Time after which the operator's arc shows where it is to go [s]."""
-    gain: float = 2.0
+    gain: Annotated[float, positive()] = 2.0
     """Angular speed for each radian between the robot's direction and the one that's taken [1/s]."""
     shares: int = 4
     """Slower commands on the same arc that are tried before it brakes."""
 
     def __post_init__(self) -> None:
-        for name in ("radius", "period", "notice", "look_ahead", "gain"):
-            if finite(name, getattr(self, name), "a positive number") <= 0:
-                raise InvalidValueError(name, getattr(self, name), "a positive number")
         if self.sectors < 8 or self.shares < 1:
             raise InvalidValueError("sectors, shares", (self.sectors, self.shares), "at least 8 and 1")
 

@@ -12,14 +12,14 @@ Source: Han, Kim, Kim, Kim, "Internet Control Architecture for Internet-Based Pe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import ceil, cos, pi, remainder, sin, sqrt, tau
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.checks import finite
+from vrs.checks import finite, positive, validated
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -28,21 +28,18 @@ SLACK = 1.0 + 1e-9
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class DriveLimits:
     """How fast a mobile robot may be commanded, and how fast that may change."""
 
-    v_max: float
+    v_max: Annotated[float, positive()]
     """Largest linear speed [m/s], either way, positive."""
-    w_max: float
+    w_max: Annotated[float, positive()]
     """Largest angular speed [rad/s], either way, positive."""
-    a_max: float
+    a_max: Annotated[float, positive()]
     """Largest linear acceleration [m/s²], positive."""
-    alpha_max: float
+    alpha_max: Annotated[float, positive()]
     """Largest angular acceleration [rad/s²], positive."""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            _put_positive(self, item.name)
 
     def refusal(self, v: float, w: float) -> str:
         """Say which limit speeds [m/s], [rad/s] break; empty if none."""
@@ -69,24 +66,14 @@ class DriveLimits:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Wheels:
     """Two driven wheels on one axle."""
 
-    base: float
+    base: Annotated[float, positive()]
     """L: distance between the wheels' points of contact [m], positive."""
-    radius: float
+    radius: Annotated[float, positive()]
     """Of a wheel [m], positive."""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            _put_positive(self, item.name)
-
-
-def _put_positive(value: DriveLimits | Wheels, name: str) -> None:
-    number = finite(name, getattr(value, name), "a positive number")
-    if number <= 0:
-        raise InvalidValueError(name, number, "a positive number")
-    object.__setattr__(value, name, number)
 
 
 @runtime_checkable

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from interfaces.lab.claims import OWN_BAR, Claim, Findings, Results, Study, Table, above, at_most, none_of
-from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script
+from interfaces.lab.doulgeri.script import HOME, Act, limits_used, played, replay, script, twins
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, interval_name, median
-from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, LinkConditions, Service, delay_profile
+from interfaces.link import BernoulliLoss, Conditions, ConstantDelay, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import Correction, OperatorSite, OperatorSiteConfig, RobotSite, RobotSiteConfig
+from interfaces.teleop import Correction
 from vrs import JointTarget, MotionCommand, Timeline
 from vrs.commands import Command
 from vrs.model import Array
@@ -51,7 +51,7 @@ def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
     t, gaps = [], []
     while lab.now < since + PATIENCE:
         t.append(lab.now - since)
-        gaps.append(apart(lab.operator.engine.timeline, lab.robot.engine.timeline, lab.now))
+        gaps.append(apart(lab.operator.robot.engine.timeline, lab.robot.engine.timeline, lab.now))
         if len(gaps) > 100 and max(gaps[-100:]) <= AGREE:
             break
         lab.run(lab.now + LOOK)
@@ -63,34 +63,29 @@ def _watch(lab: Laboratory, since: float) -> tuple[float, Array, Array]:
 def _seen(lab: Laboratory, since: float, unlinked: Timeline) -> Results:
     """What is seen from some time on; `unlinked` is the virtual robot's timeline where nothing comes back."""
     agreed, t, gaps = _watch(lab, since)
-    made: list[Correction] = lab.operator.corrections
+    made: list[Correction] = lab.operator.robot.corrections
     after = [c.t - since for c in made if c.t >= since]
     grid = np.arange(0.0, lab.now, 0.01)
-    limits, timeline = MODEL.limits, lab.operator.engine.timeline
-    used = [
-        np.abs(timeline.sample(grid, derivative=k) / top).max()
-        for k, top in ((1, limits.qd_max), (2, limits.qdd_max))
-    ]
+    timeline = lab.operator.robot.engine.timeline
     return Results(
         agreed=agreed,  # until the timelines agree for good [s]; infinite where they don't
         noticed=min(after, default=np.inf),  # until the virtual robot was corrected [s]; infinite where it wasn't
         corrections=tuple(float(np.abs(c.error).max()) for c in made),  # largest error of a joint at each [rad]
         durations=tuple(c.end - c.t for c in made),  # of each [s]
         unlinked=apart(unlinked, lab.robot.engine.timeline, lab.now),  # how far the two are apart at the end [rad]
-        limits=float(max(used)),  # largest speed or acceleration, corrections included, as a share of its limit
+        # Largest speed or acceleration, corrections included, as a share of its limit.
+        limits=limits_used(timeline.sample(grid, derivative=1), timeline.sample(grid, derivative=2)),
         t=t,  # from then on [s]
         apart=gaps,  # how far the timelines are apart at t, and from then on [rad]
     )
 
 
 def _lab(seed: int, way: Conditions, D: float | None) -> Laboratory:
-    operator = OperatorSite(MODEL, HOME, now=0.0, config=OperatorSiteConfig())
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
-    return Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 21)))
+    return twins(way, np.random.default_rng((seed, 21)), D)
 
 
 def _say(lab: Laboratory, command: Command, now: float) -> None:
-    lab.operator.execute(command, now=now)
+    lab.operator.robot.execute(command, now=now)
 
 
 def _give(lab: Laboratory, acts: tuple[Act, ...]) -> float:
@@ -122,7 +117,7 @@ def block(seed: int) -> Results:
     _, reference = played(lab)
     held = reference.q[-1] + 0.5 * (HOME - reference.q[-1])
     lab.robot.measured(held, now=lab.now)
-    return _seen(lab, lab.now, lab.operator.engine.timeline)
+    return _seen(lab, lab.now, lab.operator.robot.engine.timeline)
 
 
 def work(study: Study, case: str) -> list[Results]:

@@ -9,17 +9,11 @@ import numpy as np
 
 from interfaces import Designer
 from interfaces.lab.claims import Claim, Findings, Study
-from interfaces.lab.doulgeri.script import HOME, MODEL, ScriptedSite, script, target
-from interfaces.link import Conditions, ConstantDelay, LinkConditions
-from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
+from interfaces.lab.doulgeri.script import D_B, D_F, HOME, MODEL, ScriptedSite, script, target, twins
+from interfaces.link import Conditions, ConstantDelay
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
 from vrs.ledger import Receipt
 
-D_F: Final = 0.3
-"""Forward delay [s]."""
-D_B: Final = 0.2
-"""Backward delay [s]."""
 II_C: Final = "Section II-C"
 IV: Final = "Section IV"
 
@@ -74,14 +68,12 @@ def over_a_link(D: float, seed: int, length: float) -> tuple[int, int, int]:
 def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands postponed at the operator's site and at the robot's, and how many both accepted or postponed."""
     rng = np.random.default_rng(seed)
-    operator = OperatorSite(MODEL, HOME, now=0.0)
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
-    way = Conditions(delay=ConstantDelay("constant", D_F))
-    lab = Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
+    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, D)
+    operator = lab.operator
     mine: dict[int, float] = {}
 
     def give(command: MotionCommand, now: float) -> None:
-        receipt = operator.execute(command, now=now)
+        receipt = operator.robot.execute(command, now=now)
         if isinstance(receipt, Receipt) and receipt.execute_at is not None:
             mine[receipt.command_id] = receipt.execute_at
 
@@ -89,9 +81,11 @@ def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
         if isinstance(act.command, MotionCommand) and act.command.insertion != "append":
             lab.schedule(act.t, partial(give, act.command))
     lab.run(length + 10.0)
-    theirs = {i: receipt.execute_at for i, receipt in operator.receipts.items() if receipt.execute_at is not None}
+    theirs = {
+        i: receipt.execute_at for i, receipt in operator.robot.receipts.items() if receipt.execute_at is not None
+    }
     postponed = sum(theirs[i] > mine[i] + 1e-9 for i in theirs if i in mine)
-    first = sum(receipt.status is Status.POSTPONED for receipt in operator.engine.receipts)
+    first = sum(receipt.status is Status.POSTPONED for receipt in operator.robot.engine.receipts)
     return first, postponed, len(theirs)
 
 

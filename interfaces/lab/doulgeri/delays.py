@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces import Designer, Viewer
 from interfaces.lab.claims import Cell, Claim, Findings, Results, Study, Table, at_most
-from interfaces.lab.doulgeri.script import PortLog, ScriptedSite, arrivals, target
+from interfaces.lab.doulgeri.script import D_B, D_F, PortLog, ScriptedSite, arrivals, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Frame, FrameStatus, ViewForm
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-D_F: Final = 0.3
-"""Forward delay [s]."""
-D_B: Final = 0.2
-"""Backward delay [s]."""
 RATE: Final = 50.0
 """Frames a second."""
 COMMANDS: Final = 0.8

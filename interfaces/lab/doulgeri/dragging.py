@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.lab.claims import OWN_BAR, Findings, Results, Study, Table, at_most, none_of
-from interfaces.lab.doulgeri.script import HOME, MODEL, played, tool
+from interfaces.lab.doulgeri.script import HOME, limits_used, played, tool, twins
 from interfaces.lab.output import INK, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap
-from interfaces.link import Conditions, LinkConditions, Service, delay_profile
-from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite
+from interfaces.link import Conditions, Service, delay_profile
 from vrs import Status, SteerCommand
 from vrs.comparison import best_lag
 from vrs.ledger import Receipt
@@ -57,16 +55,15 @@ def drag(seed: int, length: float) -> Results:
     rng = np.random.default_rng((seed, 9))
     offsets, speeds = hand(rng, length)
     begin = tool(HOME[None])[0]
-    operator, robot = OperatorSite(MODEL, HOME, now=0.0), RobotSite(MODEL, HOME, now=0.0)
-    way = Conditions(delay=delay_profile(DELAY), service=Service.DATAGRAM)
-    lab = Laboratory(operator, robot, LinkConditions.symmetric(way), rng, tick=PERIOD)
+    lab = twins(Conditions(delay=delay_profile(DELAY), service=Service.DATAGRAM), rng)
+    operator = lab.operator
     begun: list[float] = []
     rejected: list[int] = []
 
     def pull(k: int, now: float) -> None:
-        off = begin + offsets[k] - tool(operator.engine.joints(now)[None])[0]
+        off = begin + offsets[k] - tool(operator.robot.engine.joints(now)[None])[0]
         twist = np.concatenate((speeds[k] + STIFFNESS * off, np.zeros(3)))
-        receipt = operator.execute(SteerCommand(twist=twist, issued_at=now), now=now)
+        receipt = operator.robot.execute(SteerCommand(twist=twist, issued_at=now), now=now)
         assert isinstance(receipt, Receipt)
         if receipt.status is Status.REJECTED or receipt.execute_at is None:
             rejected.append(k)
@@ -78,20 +75,19 @@ def drag(seed: int, length: float) -> Results:
         lab.schedule(start + PERIOD * k, partial(pull, k))
     lab.run(start + length + 5.0)
     t = start + PERIOD * np.arange(len(offsets))
-    pointer, virtual = begin + offsets, tool(operator.engine.timeline.sample(t))
-    limits = MODEL.limits
+    pointer, virtual = begin + offsets, tool(operator.robot.engine.timeline.sample(t))
     play, reference = played(lab)
     rows = np.searchsorted(lab.t, t + 1e-9) - 1
     real = tool(reference.q)
     distance = np.linalg.norm(virtual - pointer, axis=1)
-    aside = np.linalg.norm(tool(operator.engine.timeline.sample(play.p)) - real, axis=1)
-    used = (np.abs(reference.qd) / limits.qd_max).max(), (np.abs(reference.qdd) / limits.qdd_max).max()
+    aside = np.linalg.norm(tool(operator.robot.engine.timeline.sample(play.p)) - real, axis=1)
     return Results(
         following=float(np.sqrt(np.mean(distance**2))),  # virtual tool from the hand, root mean square [m]
         largest=float(distance.max()),  # [m]
         lag=_lag(t, pointer, virtual, 1.0),  # of the virtual tool behind the hand [s]
         answered=max(begun, default=np.inf),  # from an input to the virtual robot's motion by it, at most [s]
-        limits=float(max(used)),  # largest speed or acceleration of the real robot, as a share of its limit
+        # Largest speed or acceleration of the real robot, as a share of its limit.
+        limits=limits_used(reference.qd, reference.qdd),
         rejected=len(rejected),
         inputs=len(offsets),
         real=float(aside.max()),  # real tool from the virtual one's path, at equal timeline time, at most [m]

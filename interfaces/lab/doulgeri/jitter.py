@@ -20,12 +20,11 @@ from interfaces.lab.claims import (
     below_zero,
     none_of,
 )
-from interfaces.lab.doulgeri.script import HOME, MODEL, Act, played, replay, script, tool
+from interfaces.lab.doulgeri.script import Act, limits_used, played, replay, script, tool, twins
 from interfaces.lab.output import MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import bootstrap, clustered, interval_name
-from interfaces.link import Conditions, LinkConditions, Service, delay_profile
+from interfaces.link import Conditions, Service, delay_profile
 from interfaces.runtime.laboratory import Laboratory
-from interfaces.teleop import OperatorSite, RobotSite, RobotSiteConfig
 from vrs import MotionCommand
 from vrs.comparison import compare_paths
 from vrs.ledger import Receipt
@@ -42,8 +41,6 @@ LONGEST: Final = 900.0
 """How long after the last command is waited for the robot [s]."""
 TOGETHER: Final = 0.5
 """Moves given at least so far apart [s] that begin at the robot within half their distance are a burst."""
-BEAT: Final = 0.1
-"""Between the robot's reports [s]."""
 OVER: Final = 1e-9
 """How far a limit may be passed, by rounding."""
 SOURCE: Final = f"Section VII, (a); {OWN_BAR}"
@@ -59,15 +56,13 @@ def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Result
         D: Fixed offset of the robot's clock [s]; None adapts.
     """
     acts = script(np.random.default_rng((seed, 1)), length)
-    operator = OperatorSite(MODEL, HOME, now=0.0)
-    robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D, beat=BEAT))
     way = Conditions(delay=delay_profile(profile), service=Service.DATAGRAM)
-    lab = Laboratory(operator, robot, LinkConditions.symmetric(way), np.random.default_rng((seed, 2)))
+    lab = twins(way, np.random.default_rng((seed, 2)), D)
     begun: dict[int, float] = {}
     sent: list[int] = []
 
     def give(act: Act, now: float) -> None:
-        receipt = operator.execute(act.command, now=now)
+        receipt = lab.operator.robot.execute(act.command, now=now)
         if not isinstance(receipt, Receipt) or receipt.execute_at is None:
             return
         sent.append(receipt.command_id)
@@ -84,21 +79,19 @@ def run(profile: str, seed: int, length: float, D: float | None) -> tuple[Result
 
 def _done(lab: Laboratory, sent: int) -> bool:
     """Whether the operator knows that all commands were carried out, and the robot has come to its end."""
-    report, timelines = lab.operator.report, (lab.operator.engine.timeline, lab.robot.engine.timeline)
+    report, timelines = lab.operator.report, (lab.operator.robot.engine.timeline, lab.robot.engine.timeline)
     return report is not None and report.executed >= sent and report.play > max(t.end for t in timelines)
 
 
 def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Results:
-    limits = MODEL.limits
     play, reference = played(lab)
     leader, follower = tool(replay(acts).timeline.sample(lab.t)), tool(reference.q)
     v_max = float(np.linalg.norm(np.diff(leader, axis=0), axis=1).max()) / float(lab.t[1] - lab.t[0])
     path = compare_paths(lab.t, leader, follower, v_max=max(v_max, 0.5))
-    aside = np.linalg.norm(tool(lab.operator.engine.timeline.sample(play.p)) - follower, axis=1).max()
-    used = (np.abs(reference.qd) / limits.qd_max).max(), (np.abs(reference.qdd) / limits.qdd_max).max()
+    aside = np.linalg.norm(tool(lab.operator.robot.engine.timeline.sample(play.p)) - follower, axis=1).max()
     timeline = lab.robot.engine.timeline
     moved = set(timeline.owners(0, len(timeline)))
-    theirs = {i: r for i, r in lab.operator.receipts.items() if r.execute_at is not None}
+    theirs = {i: r for i, r in lab.operator.robot.receipts.items() if r.execute_at is not None}
     both = sorted(
         (begun[i], theirs[i].execute_at or 0.0, theirs[i].command_id in moved) for i in begun if i in theirs
     )
@@ -122,11 +115,11 @@ def _seen(lab: Laboratory, acts: tuple[Act, ...], begun: dict[int, float]) -> Re
         progress=path.progress,  # share of the path reached
         aside=float(aside),  # real tool from the virtual one at the same time on the timeline, at most [m]
         bursts=bursts(given, there),
-        limits=float(max(used)),  # largest speed or acceleration, as a share of its limit
+        limits=limits_used(reference.qd, reference.qdd),  # largest speed or acceleration, as a share of its limit
         pace=float(play.pace.max()),  # fastest that the timeline was played
         postponed=sum(at > asked + OVER for asked, at, _ in both),  # moves that began later at the robot
         moves=len(both),
-        corrections=len(lab.operator.corrections),  # of the virtual robot, by the real one
+        corrections=len(lab.operator.robot.corrections),  # of the virtual robot, by the real one
     )
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from interfaces.clients.ports import MemoryTransport, RemotePort
 from interfaces.engine_server.site import Site
-from interfaces.link import Channel, ConstantDelay
+from interfaces.link import Channel, Conditions, ConstantDelay, LinkConditions
 from interfaces.messages import Broadcast, Frame, Outcome, Reply
 from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
-from interfaces.teleop import JointReference
+from interfaces.teleop import FollowingArm, JointReference, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from robots.onboard.playout import PlayState
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
@@ -22,6 +22,12 @@ MODEL: Final = puma560.model()
 HOME: Final = MODEL.poses["nominal"]
 REACH: Final = 0.8
 """How far from home targets lie, at most [rad]."""
+
+
+D_F: Final = 0.3
+"""Forward delay [s]."""
+D_B: Final = 0.2
+"""Backward delay [s]."""
 
 
 class Act(NamedTuple):
@@ -129,6 +135,25 @@ class PortLog:
             self.frames.append((message.frame, now))
         elif isinstance(message, Outcome):
             self.outcomes.setdefault(message.number, message)
+
+
+def twins(way: Conditions, rng: np.random.Generator, D: float | None = None) -> Laboratory:
+    """Both sites of a robot at home, over a link that does the same each way.
+
+    Args:
+        way: What it does.
+        rng: Source of everything random in it.
+        D: Fixed offset of the robot's clock [s]; None adapts.
+    """
+    operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
+    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
+    return Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
+
+
+def limits_used(qd: Array, qdd: Array) -> float:
+    """Largest speed [rad/s] or acceleration [rad/s²] of rows of joints, as a share of its limit."""
+    limits = MODEL.limits
+    return float(max((np.abs(qd) / limits.qd_max).max(), (np.abs(qdd) / limits.qdd_max).max()))
 
 
 def played(lab: Laboratory) -> tuple[PlayState, JointReference]:

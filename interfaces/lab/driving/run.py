@@ -33,8 +33,8 @@ from interfaces.teleop.architectures.compositions import (
     robot_surroundings,
 )
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Senses
-from robots.ipr.robot import MobileRobot
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
 

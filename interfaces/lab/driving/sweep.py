@@ -17,8 +17,8 @@ from interfaces.runs.drive_run import DriveCase, Row, row_of
 from interfaces.runs.summary import Attribution
 from interfaces.teleop.architectures import Transport
 from interfaces.teleop.architectures.compositions import SENSING
-from robots.ipr.chassis import MobileReality
-from robots.ipr.robot import place
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import place
 from vrs.comparison import PathComparison
 
 LEAST_PROGRESS = 0.97

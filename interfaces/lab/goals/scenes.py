@@ -12,13 +12,13 @@ import numpy as np
 
 from interfaces.lab.goals.trial import TripSetting, seen_all
 from robots.bullet.rooms import Room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import IPR
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.navigation import route_map
-from robots.ipr.robot import place
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.navigation import route_map
+from robots.mobile.robot import place
 from robots.onboard.journey import Goal
 from robots.onboard.routes import Route, RouteMap
+from robots.robot import USUAL_BASE, load
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -60,7 +60,7 @@ def _people(seed: int, number: int) -> TripSetting:
 
 def _physics(seed: int, number: int) -> TripSetting:
     made = _round(seed, number) if number % 3 == 2 else _furniture(seed, number)
-    return replace(made, robot="ipr")
+    return replace(made, body=load(USUAL_BASE).usual_body)
 
 
 def _in_an_apartment(seed: int, number: int, group: int, people: int = 0) -> TripSetting:
@@ -159,10 +159,11 @@ def _drawn(
     Raises:
         InvalidValueError: If the room has none.
     """
-    whole = route_map(seen_all(room if truth is None else truth), IPR.footprint)
+    footprint = load(USUAL_BASE).base.body
+    whole = route_map(seen_all(room if truth is None else truth), footprint)
     # Where it begins the robot must have room as things are at first.
-    first = route_map(seen_all(room), IPR.footprint)
-    mapped = route_map(room, IPR.footprint)
+    first = route_map(seen_all(room), footprint)
+    mapped = route_map(room, footprint)
     for _ in range(_TRIES):
         start, goal = _place(room, rng), _place(room, rng)
         free = first.is_free(start) and whole.is_free(goal) and whole.is_free(start)

@@ -28,10 +28,10 @@ from interfaces.lab.goals.trial import Trip, seen_all, travel
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, to_json, write_files
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.bullet.rooms import Block, Column, Room
-from robots.ipr.chassis import IPR
-from robots.ipr.navigation import route_config
+from robots.mobile.navigation import route_config
 from robots.onboard.journey import JourneyState
 from robots.onboard.routes import RouteProblem
+from robots.robot import USUAL_BASE, load
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -134,7 +134,8 @@ def measure(study: Study, case: str) -> Trip:
     chosen = setting(group, study.seed, int(number))
     begin, end = chosen.start[:2], (chosen.goal.x, chosen.goal.y)
     # A disc as wide as the robot, with what its routes keep free on either side.
-    radius = route_config(IPR.footprint).half_width + route_config(IPR.footprint).margin
+    needed = route_config(load(USUAL_BASE).base.body)
+    radius = needed.half_width + needed.margin
     mapped, true = (
         Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
     )

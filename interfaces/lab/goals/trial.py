@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.navigation import BodyNavigator, route_map
-from robots.ipr.position import LaserPosition
-from robots.ipr.robot import BareBody, Collision, MobileRobot
-from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.navigation import BodyNavigator, route_map
+from robots.mobile.position import LaserPosition
+from robots.mobile.robot import Collision, MobileRobot
+from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
 from robots.onboard.routes import Route, RouteProblem
+from robots.robot import BARE, USUAL_BASE, load
 from vrs.mobile import wrapped
 from vrs.model import Array
 
@@ -36,8 +37,8 @@ class TripSetting:
     goal: Goal
     seed: tuple[int, ...]
     """Of the robot's noise and slip."""
-    robot: str = "bare"
-    """`bare`, or `ipr` in PyBullet."""
+    body: str = BARE
+    """One of the usual mobile robot's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,11 +90,9 @@ def body_of(setting: TripSetting, reality: MobileReality | None = None) -> Mobil
     noise = NOISES[setting.seed[-1] % len(NOISES)]
     senses = Senses(camera=None, laser=LaserModel(noise=noise))
     rng = np.random.default_rng([*setting.seed, 2])
-    if setting.robot == "bare":
-        return BareBody("ipr", setting.start, room=setting.room, reality=reality, rng=rng, senses=senses)
-    from robots.ipr.body import MobileBody
-
-    return MobileBody("ipr", setting.start, room=setting.room, reality=reality, rng=rng, senses=senses)
+    make = load(USUAL_BASE).body(setting.body)
+    body: MobileRobot = make(setting.start, room=setting.room, reality=reality, rng=rng, senses=senses)
+    return body
 
 
 class TrialPilot:
@@ -125,7 +124,7 @@ class TrialPilot:
         self.posture = self._position.posture()
         self.lost = max(self.lost, math.dist(self.posture[:2], body.truth[:2]))
         wanted = self._on_board.drive(self.posture, v_before=self._before.v)
-        self._before = kept(wanted.v, wanted.w, self._before.v, CONTROL, IPR_LIMITS)
+        self._before = kept(wanted.v, wanted.w, self._before.v, CONTROL, body.limits)
         body.drive(self._before.v, self._before.w, self._steps)
         self.track.append(body.truth)
         return self._before

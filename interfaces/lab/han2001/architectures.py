@@ -22,7 +22,7 @@ from interfaces.lab.driving.sweep import LEAST_PROGRESS, comparable
 from interfaces.lab.statistics import Estimate, bootstrap, clustered, median
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import Transport
-from robots.ipr.chassis import MobileReality
+from robots.mobile.chassis import MobileReality
 from vrs.comparison import PathComparison, summed_up
 from vrs.model import Array
 

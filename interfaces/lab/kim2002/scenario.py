@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -16,25 +16,25 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from interfaces.jobs import CarryOut, EndJob, JobRunner, Show, SilentSpeaker
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.goals.study import draw_room
 from interfaces.lab.goals.trial import FIRST_LOOK, TrialPilot
 from interfaces.lab.output import BAD, INK, MUTED, REAL, draw
 from interfaces.lab.statistics import bootstrap
 from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.bullet.rooms import Person, Room
-from robots.ipr.body import Cargo
-from robots.ipr.chassis import IPR, Senses
-from robots.ipr.robot import Collision, place
+from robots.ipr.parameters import IPR
+from robots.mobile.body import Cargo
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import place
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
 from vrs.mobile import wrapped
-from vrs.model import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
-    from robots.ipr.body import MobileBody
+    from robots.mobile.body import MobileBody
 
 HELLO: Final = "Hello!"
 """What is said at B."""
@@ -48,47 +48,6 @@ LONGEST = 150.0
 """A run that isn't over by then has failed [s]."""
 _MEETS = 10.5
 """So long after the key the robot comes by where somebody crosses its way [s], but for how he's drawn."""
-
-
-@dataclass(frozen=True, slots=True)
-class ScenarioStop:
-    """The robot at B, or at A again."""
-
-    off: float
-    """From the place to where it really is [m]."""
-    turned: float
-    """And its heading [rad]."""
-    lost: float
-    """From where it took itself to be to where it was [m]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ScenarioResult:
-    """What happened."""
-
-    stage: JobStage
-    """Of the list at the end."""
-    reason: str
-    asked: tuple[str, ...]
-    """What the list asked for, in its order."""
-    shown: str
-    """What was on the screen when the key was pressed."""
-    stops: tuple[ScenarioStop, ...]
-    """At B and at A."""
-    book: tuple[float, float, float] | None
-    """Where the book's middle lies at the end, in the robot's frame [m]; None if it was never put on."""
-    slid: float
-    """How far it slid on the robot [m]."""
-    on_top: bool
-    """Whether it's still there."""
-    touched: tuple[Collision, ...]
-    passed: float
-    """Least distance of the robot's outline from somebody on the way back [m]."""
-    lost: float
-    """Largest error of the position [m]."""
-    time: float
-    track: Array
-    """True postures, (k, 3)."""
 
 
 def home(rng: np.random.Generator) -> Room:
@@ -112,21 +71,21 @@ def home(rng: np.random.Generator) -> Room:
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 
-def play(seed: int) -> ScenarioResult:
+def play(seed: int) -> Results:
     """Run the scenario in PyBullet, in virtual time.
 
     Args:
         seed: Of the robot's noise and slip, and of when and how fast somebody walks by.
     """
-    from robots.ipr.body import MobileBody
+    from robots.mobile.body import MobileBody
 
     room = home(np.random.default_rng([seed, 1]))
     senses = Senses(camera=None, laser=LaserModel())
-    with MobileBody("ipr", room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
+    with MobileBody(IPR, room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
         return _played(room, body)
 
 
-def _played(room: Room, body: MobileBody) -> ScenarioResult:
+def _played(room: Room, body: MobileBody) -> Results:
     """Drive until the list is done, or has taken too long."""
     pilot, runner, speaker = TrialPilot(body), JobRunner(), SilentSpeaker()
     places = {one.name: Goal(one.x, one.y, one.heading) for one in room.places}
@@ -135,7 +94,7 @@ def _played(room: Room, body: MobileBody) -> ScenarioResult:
     moving = speaking = 0
     begun = brought = pressed = False
     asked: list[str] = []
-    stops: list[ScenarioStop] = []
+    stops: list[Results] = []
     shown = shown_at_key = ""
     put: tuple[float, float, float] | None = None
     passed = math.inf
@@ -182,22 +141,32 @@ def _played(room: Room, body: MobileBody) -> ScenarioResult:
     lies = body.cargo[0] if body.cargo else None
     on_top = lies is not None and lies[2] > IPR.height and max(abs(lies[0] - IPR.centre_x), abs(lies[1])) < 0.2
     slid = math.inf if lies is None or put is None else math.dist(lies[:2], put[:2])
-    return ScenarioResult(
-        stage=runner.progress.stage, reason=runner.progress.reason, asked=tuple(asked), shown=shown_at_key,
-        stops=tuple(stops), book=lies, slid=slid, on_top=on_top, touched=body.collisions,
-        passed=passed, lost=pilot.lost, time=body.time, track=np.array(pilot.track),
-    )  # fmt: skip
+    return Results(
+        stage=runner.progress.stage,  # of the list at the end
+        reason=runner.progress.reason,
+        asked=tuple(asked),  # what the list asked for, in its order
+        shown=shown_at_key,  # what was on the screen when the key was pressed
+        stops=tuple(stops),  # at B and at A
+        slid=slid,  # how far the book slid on the robot [m]
+        on_top=on_top,  # whether it's still there
+        touched=body.collisions,
+        passed=passed,  # least distance of the robot's outline from somebody on the way back [m]
+        lost=pilot.lost,  # largest error of the position [m]
+        time=body.time,
+        track=np.array(pilot.track),  # true postures, (k, 3)
+    )
 
 
-def _stop(goal: Goal | None, truth: tuple[float, float, float], told: tuple[float, float, float]) -> ScenarioStop:
+def _stop(goal: Goal | None, truth: tuple[float, float, float], told: tuple[float, float, float]) -> Results:
     """How far the robot came from a goal, and how wrong it was about that."""
     assert goal is not None
     assert goal.heading is not None
     x, y, theta = truth
-    return ScenarioStop(
-        math.hypot(goal.x - x, goal.y - y), abs(wrapped(goal.heading - theta)),
-        math.hypot(told[0] - x, told[1] - y),
-    )  # fmt: skip
+    return Results(
+        off=math.hypot(goal.x - x, goal.y - y),  # from the place to where it really is [m]
+        turned=abs(wrapped(goal.heading - theta)),  # and its heading [rad]
+        lost=math.hypot(told[0] - x, told[1] - y),  # from where it took itself to be to where it was [m]
+    )
 
 
 def gap(body: MobileBody, walker: Person) -> float:
@@ -222,13 +191,13 @@ TOGETHER: Final = 5
 """Runs are measured in so many cases."""
 
 
-def measure(study: Study, case: str) -> tuple[ScenarioResult, ...]:
+def measure(study: Study, case: str) -> tuple[Results, ...]:
     """Each `TOGETHER`-th run from the case's number on."""
     numbers = range(int(case), study.runs, TOGETHER)
     return tuple(play(int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0])) for k in numbers)
 
 
-def conclude(study: Study, measured: tuple[tuple[ScenarioResult, ...], ...]) -> Findings:
+def conclude(study: Study, measured: tuple[tuple[Results, ...], ...]) -> Findings:
     """What the paper says of its scenario."""
     found = [measured[k % TOGETHER][k // TOGETHER] for k in range(study.runs)]
     total = len(found)
@@ -252,12 +221,12 @@ def _count(total: int, what: str, good: Sequence[bool]) -> Claim:
     return Claim(what.format(total), SECTION, f"{total}", sum(good), all(good))
 
 
-def _at_a(one: ScenarioResult) -> bool:
+def _at_a(one: Results) -> bool:
     return len(one.stops) == len([job for job in JOBS if isinstance(job, MoveJob)]) and one.stops[-1].off <= NEAR
 
 
 def _at_stops(
-    study: Study, found: Sequence[ScenarioResult], what: str, bar: float, error: Callable[[ScenarioStop], float]
+    study: Study, found: Sequence[Results], what: str, bar: float, error: Callable[[Results], float]
 ) -> Iterator[Claim]:
     """An error at B and at A; infinite where the robot never came."""
     for k, name in enumerate("BA"):
@@ -281,7 +250,7 @@ COLUMNS: Final = (
 """Of the table of runs."""
 
 
-def _table(found: Sequence[ScenarioResult]) -> Table:
+def _table(found: Sequence[Results]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for k, one in enumerate(found):
         offs = [100 * stop.off for stop in one.stops] + [None] * (2 - len(one.stops))
@@ -295,7 +264,7 @@ def _table(found: Sequence[ScenarioResult]) -> Table:
     return Table("scenario", "the scenario, run by run", COLUMNS, tuple(rows))
 
 
-def picture(one: ScenarioResult) -> Figure:
+def picture(one: Results) -> Figure:
     """The room and the ways that were driven in it."""
     room = home(np.random.default_rng(0))
 

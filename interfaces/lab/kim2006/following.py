@@ -16,16 +16,17 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from interfaces.lab.kim2006.schemes import Rims, scheme
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
 from interfaces.link.losses import loss_model
 from interfaces.rsp.model import RobotModel, read_model
-from interfaces.rsp.schemes import ReportedPosition, Rims, SchemeConfig, scheme
 from robots.cubo import parameters as p
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.position import FusedPosition
-from robots.ipr.robot import BareBody, MobileRobot
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.position import FusedPosition
+from robots.mobile.robot import BareBody, MobileRobot
+from robots.onboard.driving import Posture
 from vrs.checks import one_of, validated, within
 from vrs.comparison import match_paths
 from vrs.mobile import clipped, wrapped
@@ -125,7 +126,7 @@ def course(seed: int, length: float) -> Array:
     return np.vstack(([0.0, 0.0], np.cumsum(steps, axis=0)))
 
 
-def path_leader(path: Array) -> Callable[[ReportedPosition], Rims]:
+def path_leader(path: Array) -> Callable[[Posture], Rims]:
     """The local system's controller: the path's own curvature, and what brings the robot back.
 
     For l beside the path, along the way s: d²l/ds² + 2/λ dl/ds + l/λ² = 0. The robot is back after a few λ, without
@@ -142,7 +143,7 @@ def path_leader(path: Array) -> Callable[[ReportedPosition], Rims]:
     curvature = np.gradient(headings, SPEED * TICK)
     at, reach = 0, round(3 * RECOVERY / (SPEED * TICK))
 
-    def rims(seen: ReportedPosition) -> Rims:
+    def rims(seen: Posture) -> Rims:
         nonlocal at
         near = path[at : at + reach] - (seen.x, seen.y)
         at += int(np.einsum("ij,ij->i", near, near).argmin())
@@ -181,7 +182,7 @@ def run(case: FollowingCase) -> Followed:
     """
     chosen = scheme(case.scheme)
     bytes_rng = np.random.default_rng([case.seed, 3])
-    local, robot = chosen.ends(cubo_model(), SchemeConfig(adaptive=case.adaptive), bytes_rng.bytes)
+    local, robot = chosen.ends(cubo_model(), bytes_rng.bytes, case.adaptive)
     conditions = Conditions(
         delay=delay_profile(case.delay),
         loss=loss_model(str(case.loss)),
@@ -220,7 +221,7 @@ def run(case: FollowingCase) -> Followed:
                 fired.setdefault(number, now)
             if robot.stamp is not None:
                 ages.append(now - robot.stamp)
-            robot.measure(ReportedPosition(*position.posture()))
+            robot.measure(position.posture())
             for data in robot.to_send(now=now):
                 up += len(data)
                 link.backward.send(data, now, len(data) + chosen.header)

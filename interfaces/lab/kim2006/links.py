@@ -10,9 +10,9 @@ import numpy as np
 
 from interfaces.lab.claims import Cell, Claim, Figure, Findings, Results, Study, Table
 from interfaces.lab.kim2006.following import Followed, FollowingCase, run
+from interfaces.lab.kim2006.schemes import SCHEMES
 from interfaces.lab.output import BAD, GOOD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap
-from interfaces.rsp.schemes import SCHEMES
 
 PROFILES: Final = ("none", "constant:0.1", "domain", "country", "mon", "tue", "wed", "thu", "fri", "lunar")
 LOSSES: Final = (0.0, 0.05, 0.1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Figure, Findings, Results, Study, Table, at_least, at_most
 from interfaces.lab.localization.trial import (
     CONTROL,
     STILL,
@@ -26,7 +26,7 @@ from interfaces.lab.localization.trial import (
 )
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw
 from robots.bullet.rooms import Room
-from robots.ipr.floor_plan import plan_map
+from robots.mobile.floor_plan import plan_map
 from robots.onboard.gsp_map import GspMap
 from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer
@@ -162,26 +162,7 @@ SETTLED = 20
 """Rows before which doubt isn't judged: the first scan comes after the first row."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomFound:
-    """What a room gave."""
-
-    number: int
-    name: str
-    people: int
-    noise: float
-    """Of the ranges [m]."""
-    way: float
-    """How far the robot drove [m]."""
-    collisions: int
-    lines: tuple[int, int]
-    """Of the floor-plan map and of the built one."""
-    tracks: dict[str, PostureErrors]
-    scene: DrawnDrive | None
-    """To be drawn; of the first room."""
-
-
-def measure_room(study: Study, case: str) -> RoomFound:
+def measure_room(study: Study, case: str) -> Results:
     """Build a map, then drive again with everybody, then with the slow sweep."""
     number = int(case)
     room = furnished(study.seed, number)
@@ -198,11 +179,16 @@ def measure_room(study: Study, case: str) -> RoomFound:
         later = drive(body, study.length, wander(slow), {SLOW: Localizer(plan, body.truth)})
     if scene is not None:
         scene.record = record
-    way = float(np.hypot(*np.diff(record.truth[:, :2], axis=0).T).sum())
-    return RoomFound(
-        number, room.name, len(room.people), first.laser.noise, way, record.collisions,
-        (len(plan.lines), len(built.lines)), {**record.tracks, **later.tracks}, scene,
-    )  # fmt: skip
+    return Results(
+        name=room.name,
+        people=len(room.people),
+        noise=first.laser.noise,  # of the ranges [m]
+        way=float(np.hypot(*np.diff(record.truth[:, :2], axis=0).T).sum()),  # how far the robot drove [m]
+        collisions=record.collisions,
+        lines=(len(plan.lines), len(built.lines)),  # of the floor-plan map and of the built one
+        tracks={**record.tracks, **later.tracks},  # of each method, by name
+        scene=scene,  # to be drawn; of the first room
+    )
 
 
 def _with_all(study: Study, number: int, plan: GspMap, built: GspMap, scene: DrawnDrive | None) -> Record:
@@ -222,7 +208,7 @@ def _with_all(study: Study, number: int, plan: GspMap, built: GspMap, scene: Dra
         return drive(body, study.length, wander(chosen), everybody, hook)
 
 
-def conclude_rooms(_study: Study, found: tuple[RoomFound, ...]) -> Findings:
+def conclude_rooms(_study: Study, found: tuple[Results, ...]) -> Findings:
     """The table of all rooms together, the one of each, and the claims."""
     claims = []
     for name in (PLAN, AS_BUILT, BUILT):
@@ -233,24 +219,24 @@ def conclude_rooms(_study: Study, found: tuple[RoomFound, ...]) -> Findings:
     return Findings(tuple(claims), (_pooled(found), _by_room(found)), tuple(pictures))
 
 
-def _accuracy(name: str, found: tuple[RoomFound, ...]) -> list[Claim]:
+def _accuracy(name: str, found: tuple[Results, ...]) -> list[Claim]:
     place, turn, largest = _all(name, found)
     bar, turn_bar = BARS[name]
     good = sum(_keeps(name, one.tracks[name]) for one in found)
     made = [
-        Claim(f"{name}: 95 % of position errors [cm]", OWN_BAR, f"≤ {100 * bar:g}", 100 * place, place <= bar),
-        Claim(f"{name}: 95 % of heading errors [deg]", OWN_BAR, f"≤ {turn_bar:g}", turn, turn <= turn_bar),
+        at_most(f"{name}: 95 % of position errors [cm]", OWN_BAR, 100 * bar, 100 * place),
+        at_most(f"{name}: 95 % of heading errors [deg]", OWN_BAR, turn_bar, turn),
     ]
     if name != BUILT:
         least = math.ceil(ROOMS * len(found) - 1e-9)
         what = f"{name}: rooms of {len(found)} in which both are kept"
-        made.append(Claim(what, OWN_BAR, f"≥ {least}", good, good >= least))
+        made.append(at_least(what, OWN_BAR, least, good))
         what = f"{name}: largest position error [cm]"
-        made.append(Claim(what, OWN_BAR, f"≤ {100 * LARGEST:g}", 100 * largest, largest <= LARGEST))
+        made.append(at_most(what, OWN_BAR, 100 * LARGEST, 100 * largest))
     return made
 
 
-def _honesty(name: str, found: tuple[RoomFound, ...]) -> list[Claim]:
+def _honesty(name: str, found: tuple[Results, ...]) -> list[Claim]:
     mean, inside = _nees(name, found)
     return [
         Claim(f"{name}: mean squared normalised error, 3 if honest", OWN_BAR, "2 to 4", mean, 2 <= mean <= 4),
@@ -267,14 +253,14 @@ def _keeps(name: str, track: PostureErrors) -> bool:
     return bool(place <= bar and math.degrees(float(turn)) <= turn_bar)
 
 
-def _all(name: str, found: tuple[RoomFound, ...]) -> tuple[float, float, float]:
+def _all(name: str, found: tuple[Results, ...]) -> tuple[float, float, float]:
     """95 % of position [m] and heading [deg] and the largest position error [m] of all rooms."""
     place = np.concatenate([one.tracks[name].place for one in found])
     turn = np.concatenate([one.tracks[name].turn for one in found])
     return float(np.quantile(place, 0.95)), math.degrees(float(np.quantile(turn, 0.95))), float(place.max())
 
 
-def _nees(name: str, found: tuple[RoomFound, ...]) -> tuple[float, float]:
+def _nees(name: str, found: tuple[Results, ...]) -> tuple[float, float]:
     values = np.concatenate([_judged(one.tracks[name]) for one in found])
     return float(values.mean()), float(np.mean(values <= INSIDE))
 
@@ -284,7 +270,7 @@ def _judged(track: PostureErrors) -> Array:
     return values[np.isfinite(values)]
 
 
-def _pooled(found: tuple[RoomFound, ...]) -> Table:
+def _pooled(found: tuple[Results, ...]) -> Table:
     rows = []
     for name in METHODS:
         place, turn, largest = _all(name, found)
@@ -302,7 +288,7 @@ def _pooled(found: tuple[RoomFound, ...]) -> Table:
     )
 
 
-def _by_room(found: tuple[RoomFound, ...]) -> Table:
+def _by_room(found: tuple[Results, ...]) -> Table:
     columns = (
         "room", "people", "noise [cm]", "way [m]", "collisions", "lines, plan", "lines, built",
         *(f"{name}, {what}" for name in METHODS for what in ("95 % [cm]", "heading [deg]")),

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Study, Table
+from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Results, Study, Table, at_least, at_most
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.floor_plan import FloorPlan, Ways, plan_map
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer, Status
 from vrs.mobile import wrapped
@@ -190,17 +189,14 @@ def conclude_starts(_study: Study, found: tuple[tuple[str, Counter[str]], ...]) 
     """How many were found."""
     count = sum((answers for _, answers in found), Counter[str]())
     starts = count.total()
-    right, wrong = count["right"] / starts, count["wrong"] / starts
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (room, *(answers[what] for what in ANSWERS)) for room, answers in found
+    claims = (
+        at_least(f"of {starts} starts found [%]", OWN_BAR, 95, 100 * (count["right"] / starts)),
+        at_most("wrong and confident [%]", OWN_BAR, 1, 100 * (count["wrong"] / starts)),
     )
-    return Findings(
-        (
-            Claim(f"of {starts} starts found [%]", OWN_BAR, "≥ 95", 100 * right, right >= 0.95),
-            Claim("wrong and confident [%]", OWN_BAR, "≤ 1", 100 * wrong, wrong <= 0.01),
-        ),
-        (Table("starts", f"starts anywhere, {STARTS} an apartment at most", ("apartment", *ANSWERS), rows),),
-    )  # fmt: skip
+    rows: list[list[tuple[str, Cell]]] = [
+        [("apartment", room), *((what, answers[what]) for what in ANSWERS)] for room, answers in found
+    ]
+    return Findings(claims, (Table.of("starts", f"starts anywhere, {STARTS} an apartment at most", rows),))
 
 
 def symmetric(number: int) -> Room:
@@ -213,21 +209,7 @@ def symmetric(number: int) -> Room:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Twofold:
-    """What was said in a symmetric room."""
-
-    room: str
-    status: str
-    named: int
-    """Places that were named."""
-    expected: int
-    """Places that look the same."""
-    off: float
-    """Of the nearest [m]."""
-
-
-def measure_symmetric(study: Study, case: str) -> Twofold:
+def measure_symmetric(study: Study, case: str) -> Results:
     """A turn on the spot in a symmetric room."""
     number = int(case)
     room = symmetric(number)
@@ -238,38 +220,36 @@ def measure_symmetric(study: Study, case: str) -> Twofold:
         localizer.move(body.time, body.reckoned)
         truth = body.truth
     offs = [math.dist(one.posture[:2], truth[:2]) for one in localizer.candidates]
-    expected = 4 if room.length == room.width else 2
-    return Twofold(room.name, localizer.status.value, len(offs), expected, min(offs, default=math.nan))
-
-
-def conclude_symmetric(_study: Study, found: tuple[Twofold, ...]) -> Findings:
-    """Whether it said so."""
-    good = sum(one.status == Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in found)
-    rows = tuple((one.room, one.status, one.expected, one.named, 100 * one.off) for one in found)
-    columns = ("room", "answer", "places that look the same", "named", "nearest off [cm]")
-    what = f"of {len(found)} symmetric rooms called ambiguous, with all places that look the same"
-    return Findings(
-        (Claim(what, OWN_BAR, len(found), good, good == len(found)),),
-        (Table("symmetric", "rooms that look the same from several places", columns, rows),),
+    return Results(
+        room=room.name,
+        status=localizer.status,
+        named=len(offs),  # places that were named
+        expected=4 if room.length == room.width else 2,  # places that look the same
+        off=min(offs, default=math.nan),  # of the nearest [m]
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Carried:
-    """A robot that was carried off."""
+def conclude_symmetric(_study: Study, found: tuple[Results, ...]) -> Findings:
+    """Whether it said so."""
+    good = sum(one.status is Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in found)
+    rows = [
+        (
+            ("room", one.room),
+            ("answer", one.status.value),
+            ("places that look the same", one.expected),
+            ("named", one.named),
+            ("nearest off [cm]", 100 * one.off),
+        )
+        for one in found
+    ]
+    what = f"of {len(found)} symmetric rooms called ambiguous, with all places that look the same"
+    return Findings(
+        (Claim(what, OWN_BAR, len(found), good, good == len(found)),),
+        (Table.of("symmetric", "rooms that look the same from several places", rows),),
+    )
 
-    room: str
-    distance: float
-    """How far [m]."""
-    noticed: float
-    """After so long [s]; inf if never."""
-    recovered: float
-    """And was found again after so long [s]."""
-    off: float
-    """At the end [m]."""
 
-
-def measure_carried(study: Study, case: str) -> Carried:
+def measure_carried(study: Study, case: str) -> Results:
     """Drive, be carried off, drive on; turn on the spot when the localizer wants it."""
     number = int(case)
     room = _distinctive(study.seed, number)
@@ -293,20 +273,33 @@ def measure_carried(study: Study, case: str) -> Carried:
     events = [event for event in localizer.events if event.time > CARRIED]
     noticed = next((e.time - CARRIED for e in events if e.status is not Status.TRACKING), math.inf)
     found = [e.time - CARRIED for e in events if e.status is Status.TRACKING]
-    off = float(record.tracks[""].place[-1])
-    return Carried(room.name, carried[0], noticed, found[-1] if found else math.inf, off)
+    return Results(
+        room=room.name,
+        distance=carried[0],  # how far it was carried [m]
+        noticed=noticed,  # after so long [s]; inf if never
+        recovered=found[-1] if found else math.inf,  # and found again after so long [s]
+        off=float(record.tracks[""].place[-1]),  # at the end [m]
+    )
 
 
-def conclude_carried(_study: Study, found: tuple[Carried, ...]) -> Findings:
+def conclude_carried(_study: Study, found: tuple[Results, ...]) -> Findings:
     """Whether it noticed, and recovered."""
     noticed = sum(one.noticed <= NOTICED for one in found)
     recovered = sum(one.off <= NEAR for one in found)
-    rows = tuple((one.room, one.distance, one.noticed, one.recovered, 100 * one.off) for one in found)
-    columns = ("apartment", "carried [m]", "noticed after [s]", "found after [s]", "off at the end [cm]")
+    rows = [
+        (
+            ("apartment", one.room),
+            ("carried [m]", one.distance),
+            ("noticed after [s]", one.noticed),
+            ("found after [s]", one.recovered),
+            ("off at the end [cm]", 100 * one.off),
+        )
+        for one in found
+    ]
     claims = (
         Claim(
             f"of {len(found)} carried off, noticed within 3 s", OWN_BAR, len(found), noticed, noticed == len(found)
         ),
         Claim("and found again", OWN_BAR, len(found), recovered, recovered == len(found)),
     )
-    return Findings(claims, (Table("carried", "robots that were carried off", columns, rows),))
+    return Findings(claims, (Table.of("carried", "robots that were carried off", rows),))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from interfaces.lab.claims import OWN_BAR, Claim, Findings, Paper, PaperPart, Reproduction, Study, Table
+from interfaces.lab.claims import OWN_BAR, Findings, Paper, PaperPart, Reproduction, Results, Study, Table, at_least
 from interfaces.lab.localization.accuracy import INSIDE, conclude_rooms, measure_room
 from interfaces.lab.localization.searching import (
     STARTS,
@@ -24,7 +23,7 @@ from interfaces.lab.localization.searching import (
 from interfaces.lab.localization.trial import body_of, drive, setting
 from interfaces.lab.output import to_json, write_files
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.floor_plan import plan_map
+from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localizer import Localizer
 from vrs.checks import number_in
@@ -50,24 +49,7 @@ def place(name: str) -> Room:
     return read_room(f"room 1\nname {name}\nsize 40 20\nstart 17 {MIDDLE:g} 0\n{walls}", name)
 
 
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """What was said of an axis."""
-
-    place: str
-    named: float
-    """Share of the scans after which just the walls' direction was named as unobservable."""
-    none: float
-    """Share after which nothing was."""
-    along: float
-    """Standard deviation along the walls at the end [m]."""
-    across: float
-    """And across [m]."""
-    inside: float
-    """Share of normalised errors inside the 95 % bound."""
-
-
-def measure_axis(study: Study, case: str) -> Axis:
+def measure_axis(study: Study, case: str) -> Results:
     """Drive along the walls."""
     chosen = setting(place(case), 1, 0.03, (study.seed, PLACES.index(case), 23))
     said: list[tuple[bool, bool]] = []
@@ -87,8 +69,14 @@ def measure_axis(study: Study, case: str) -> Axis:
     track = record.tracks[""]
     last = track.covariances[-1]
     named, none = np.mean(said, axis=0).tolist()
-    inside = float(np.mean(track.normalised[20:] <= INSIDE))
-    return Axis(case, named, none, math.sqrt(last[0, 0]), math.sqrt(last[1, 1]), inside)
+    return Results(
+        place=case,
+        named=named,  # share of the scans after which just the walls' direction was named as unobservable
+        none=none,  # share after which nothing was
+        along=math.sqrt(last[0, 0]),  # standard deviation along the walls at the end [m]
+        across=math.sqrt(last[1, 1]),  # and across [m]
+        inside=float(np.mean(track.normalised[20:] <= INSIDE)),  # share of normalised errors inside the 95 % bound
+    )
 
 
 def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
@@ -97,26 +85,30 @@ def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
     return Drive(SPEED, clipped(2.0 * (0.3 * math.sin(0.8 * t) - 0.5 * (y - MIDDLE) - theta), 0.7))
 
 
-def conclude_axes(_study: Study, found: tuple[Axis, ...]) -> Findings:
+def conclude_axes(_study: Study, found: tuple[Results, ...]) -> Findings:
     """Whether the axis is named, and the doubt along it honest."""
     claims = []
     for one in found:
         if one.place == "room":
             what = "room: scans after which nothing is called unobservable [%]"
-            claims.append(Claim(what, OWN_BAR, "≥ 95", 100 * one.none, one.none >= 0.95))
+            claims.append(at_least(what, OWN_BAR, 95, 100 * one.none))
             continue
         what = f"{one.place}: scans after which the way along is named as unobservable [%]"
-        claims.append(Claim(what, OWN_BAR, "≥ 95", 100 * one.named, one.named >= 0.95))
+        claims.append(at_least(what, OWN_BAR, 95, 100 * one.named))
         what = f"{one.place}: doubt along the walls, times that across"
-        claims.append(Claim(what, OWN_BAR, "≥ 10", one.along / one.across, one.along >= 10 * one.across))
-    rows = tuple(
-        (a.place, 100 * a.named, 100 * a.none, 100 * a.along, 100 * a.across, 100 * a.inside) for a in found
-    )
-    columns = (
-        "place", "way along named [%]", "nothing named [%]", "doubt along at the end [cm]", "across [cm]",
-        "inside 95 % [%]",
-    )  # fmt: skip
-    return Findings(tuple(claims), (Table("unobservable", "what can't be known", columns, rows),))
+        claims.append(at_least(what, OWN_BAR, 10, one.along / one.across))
+    rows = [
+        (
+            ("place", one.place),
+            ("way along named [%]", 100 * one.named),
+            ("nothing named [%]", 100 * one.none),
+            ("doubt along at the end [cm]", 100 * one.along),
+            ("across [cm]", 100 * one.across),
+            ("inside 95 % [%]", 100 * one.inside),
+        )
+        for one in found
+    ]
+    return Findings(tuple(claims), (Table.of("unobservable", "what can't be known", rows),))
 
 
 ROOMS, LENGTH, FULL_STARTS = 30, 60.0, 200

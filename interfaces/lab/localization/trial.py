@@ -10,16 +10,17 @@ from typing import TypeAlias
 import numpy as np
 
 from robots.bullet.rooms import Room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.floor_plan import Ways
-from robots.ipr.robot import BareBody
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import Ways
+from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Drive
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.laser import LaserModel, LaserScan
 from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer
 from robots.onboard.map_building import MapBuilder
+from robots.robot import BARE, USUAL_BASE, load
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array
 
@@ -231,11 +232,13 @@ def setting(room: Room, number: int, sweep: float, seed: tuple[int, ...]) -> Loc
     return LocalizationSetting(room, LaserModel(noise=NOISES[number % 2], sweep=sweep), reality, seed)
 
 
-def body_of(chosen: LocalizationSetting, posture: tuple[float, float, float] | None = None) -> BareBody:
+def body_of(chosen: LocalizationSetting, posture: tuple[float, float, float] | None = None) -> MobileRobot:
     """The robot at a posture, where the room says unless given."""
     senses = Senses(sonar=None, camera=None, laser=chosen.laser)
     rng = np.random.default_rng([*chosen.seed, 2])
-    return BareBody("ipr", posture, room=chosen.room, reality=chosen.reality, rng=rng, senses=senses)
+    make = load(USUAL_BASE).body(BARE)
+    body: MobileRobot = make(posture, room=chosen.room, reality=chosen.reality, rng=rng, senses=senses)
+    return body
 
 
 Driver = Callable[[float, tuple[float, float, float]], Drive]
@@ -243,7 +246,7 @@ Driver = Callable[[float, tuple[float, float, float]], Drive]
 
 
 def drive(
-    body: BareBody,
+    body: MobileRobot,
     length: float,
     driver: Driver,
     listeners: Mapping[str, PostureSource],

@@ -22,8 +22,9 @@ from interfaces.middleware import (
     MiddlewareConfig,
     default_network,
 )
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.robot import BareBody, MobileRobot
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.robot import BareBody, MobileRobot
 from robots.onboard.curve import Curve
 from robots.onboard.curve_trackers import QuadraticCurveTracker, QuadraticTrackerConfig
 from robots.onboard.driving import Posture
@@ -238,13 +239,13 @@ def make_robot(kind: str, start: tuple[float, float, float], period: float, seed
     """Put a robot in its place, which sees nothing; and how many of its steps are a sampling time."""
     if one_of("robot", kind, ROBOTS) == "kinematic":
         reality = MobileReality.ideal(dt=period)
-        return BareBody("ipr", start, reality=reality, limits=UNBOUND, senses=_BLIND, period=period), 1
-    from robots.ipr.body import MobileBody
+        return BareBody(IPR, start, reality=reality, limits=UNBOUND, senses=_BLIND, period=period), 1
+    from robots.mobile.body import MobileBody
 
     steps = max(round(period / _IPR_STEP), 1)
     reality = MobileReality(dt=period / steps)
     made = MobileBody(
-        "ipr",
+        IPR,
         start,
         reality=reality,
         limits=LIFTED,

@@ -48,12 +48,8 @@ class _ProxyClient:
     """Datagrams on their way from or to it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Parcel:
-    """A datagram on its way."""
-
-    client: _ProxyClient
-    data: bytes
+Parcel: TypeAlias = tuple[_ProxyClient, bytes]
+"""A datagram on its way."""
 
 
 class UdpProxy:
@@ -151,7 +147,7 @@ class UdpProxy:
             self.counts.overflowed += 1
             return
         before = channel.in_flight()
-        channel.send(Parcel(client, data), client.last, len(data))
+        channel.send((client, data), client.last, len(data))
         copies = channel.in_flight() - before
         client.pending += copies
         self._held[id(channel)] += copies * len(data)
@@ -161,15 +157,15 @@ class UdpProxy:
         now = self._clock.now()
         for channel in (self._there, self._back):
             for delivery in channel.receive(now):
-                parcel = delivery.payload
-                parcel.client.pending -= 1
-                parcel.client.last = now
-                self._held[id(channel)] -= len(parcel.data)
+                client, data = delivery.payload
+                client.pending -= 1
+                client.last = now
+                self._held[id(channel)] -= len(data)
                 try:
                     if channel is self._there:
-                        parcel.client.sock.send(parcel.data)
+                        client.sock.send(data)
                     else:
-                        self._listener.sendto(parcel.data, parcel.client.address)
+                        self._listener.sendto(data, client.address)
                 except OSError:
                     self.counts.unsent += 1
         deadlines = (self._there.next_deadline(), self._back.next_deadline())

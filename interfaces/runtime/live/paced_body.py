@@ -21,19 +21,12 @@ from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.runtime.live.robot import LiveBody
 from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, architecture, controller
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
+from interfaces.teleop.autonomy import Autonomy, Hands, LaserSight, NavigatorPilot
 from interfaces.teleop.connection import HostConfig
-from interfaces.teleop.driving import (
-    Autonomy,
-    DrivenConfig,
-    DrivenHost,
-    DrivenRobot,
-    Hands,
-    LaserSight,
-    NavigatorPilot,
-)
+from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
 from robots.bullet.rooms import Room
-from robots.ipr.chassis import Senses
-from robots.ipr.robot import MobileRobot
+from robots.mobile.chassis import Senses
+from robots.mobile.robot import MobileRobot
 from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.following import SoundPosition
@@ -171,14 +164,14 @@ class PacedBody(LiveBody):
             self._touched = len(collisions)
             self.host.halt(f"the robot touches something: {collisions[-1].thing}", now=now)
 
-    def new_site(self, t: float) -> DrivenRobot:
+    def new_site(self, t: float) -> FollowingBase:
         """What follows an operator from the time t of its clock on [s]."""
         body, watchdog = self.body, self.host.watchdog(self.config.driven.watchdog)
         if watchdog is not None:
             # What is decided takes effect with the next control period.
             watchdog = replace(watchdog, timeout=max(watchdog.timeout - CONTROL, 0.1))
         driven = replace(self.config.driven, watchdog=watchdog)
-        return DrivenRobot(
+        return FollowingBase(
             self._architecture,
             self._position,
             body.limits,

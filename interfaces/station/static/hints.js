@@ -25,7 +25,7 @@ const DRIVING = [
 ];
 
 export function mount(station) {
-  const hints = station.config.robot.mobile ? DRIVING : HINTS;
+  const hints = station.drives ? DRIVING : HINTS;
   const count = h("span.muted");
   const title = h("h2", { id: "hint-title" });
   const text = h("p", { id: "hint-text" });

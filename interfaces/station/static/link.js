@@ -29,7 +29,7 @@ function pill(id, title) {
 
 export function mount(station, box) {
   const session = station.session;
-  const body = station.config.robot.mobile ? "smart_toy" : "precision_manufacturing";
+  const body = station.drives ? "smart_toy" : "precision_manufacturing";
   const link = pill("link-pill", "Connection of this page to the server");
   const robot = pill("robot-pill", "The real robot, as the server last heard of it");
   const resume = h("button.small", { type: "button", id: "resume", hidden: true }, "Resume");

@@ -82,7 +82,7 @@ export function mount(station, box) {
     if (box.offsetParent === null) return;
     const { state: now, seen, plan } = session;
     if (plan) chart.plan(plan);
-    if (now) chart.robots(now.virtual, now.real);
+    if (now) chart.robots(now.drawn ?? now.virtual, now.real);
     if (seen) chart.seen(seen, now && now.real);
     const centimetres = seen?.doubt ? 200 * Math.sqrt(Math.max(seen.doubt[0], seen.doubt[2])) : null;
     write(doubt, centimetres == null ? "" : `Place known to ${centimetres.toFixed(1)} cm (2σ).`);

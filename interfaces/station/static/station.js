@@ -13,10 +13,11 @@ class Station extends EventTarget {
   constructor(root, config) {
     super();
     this.config = config;
-    const mobile = config.robot.mobile === true;
-    /** Links and tool at joints; a mobile robot has none. */
-    this.chain = mobile ? null : new Chain(config.robot);
-    this.session = new (mobile ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
+    /** Whether the robot drives on arcs, and no joints of it move on polynomials. */
+    this.drives = config.robot.segments === "arcs";
+    /** Links and tool at joints; a robot that drives has none. */
+    this.chain = this.drives ? null : new Chain(config.robot);
+    this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
     this.layout = new Layout(root, config.panels);
     /** What panels offer each other, by the panel's name. */
     this.shared = {};

@@ -133,11 +133,11 @@ export function mount(station, box) {
     if (connected()) socket.send(JSON.stringify(message));
   }
 
-  const me = () => ({ session: session.key ?? "", holds: session.holds });
+  const me = () => ({ session: session.key ?? "" });
   let who = "";
   let relive = false;
 
-  /** The server is told by which session this page commands, and whether it has control. */
+  /** The server is told by which session this page commands. */
   function tellWho() {
     const now = JSON.stringify(me());
     if (now !== who && connected()) {
@@ -156,10 +156,7 @@ export function mount(station, box) {
 
   function take(message) {
     if (message.type === "said") hear(message);
-    else if (message.type === "take") {
-      if (session.holds) tellWho();
-      else if (session.lease.state === "free") session.wish("acquire");
-    } else if (message.type === "ready") ready(message);
+    else if (message.type === "ready") ready(message);
     else if (message.type === "completed") editor.complete(message);
   }
 

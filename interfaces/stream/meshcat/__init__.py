@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from interfaces.stream.meshcat.committed import Committed
-from interfaces.stream.meshcat.newest import ReaderPosition
 from interfaces.stream.meshcat.scene import TwinScene
 
-__all__ = ["Committed", "ReaderPosition", "TwinScene"]
+__all__ = ["Committed", "TwinScene"]

@@ -15,9 +15,9 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from interfaces.stream import server
 from interfaces.stream.meshcat.meshes import viewer_bundle
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.server import KeptFile
 from interfaces.stream.sockets import let_stay
 from vrs.errors import InvalidValueError
 
@@ -51,7 +51,6 @@ class Viewers:
     def __init__(
         self,
         source: Newest,
-        admit: Callable[[HTTPConnection], bool] | None = None,
         authorize: Callable[[str | None], bool] | None = None,
         *,
         hear: Callable[[str], str] | None = None,
@@ -61,20 +60,18 @@ class Viewers:
 
         Args:
             source: What all of them see.
-            admit: Whether a WebSocket may be opened, by its headers; None for own pages, and programs.
             authorize: Whether a token lets a viewer in; None lets all in.
             hear: Takes what a viewer says; its answer, unless empty, goes to that one. None: nobody listens.
             most_heard: Messages that a viewer may send in 10 s.
         """
         self._source = source
-        self._admit = same_origin if admit is None else admit
         self._authorize, self._hear, self._most_heard = authorize, hear, most_heard
         self._viewers: set[_Viewer] = set()
         self._watcher: asyncio.Task[None] | None = None
 
     async def serve(self, websocket: WebSocket) -> None:
         """Serve one viewer until it goes."""
-        if not self._admit(websocket):
+        if not same_origin(websocket):
             await websocket.close()
             return
         batches = BATCHES in websocket.scope["subprotocols"]
@@ -229,34 +226,25 @@ def token_in(text: str) -> str | None:
     return token if isinstance(token, str) else None
 
 
-HEADERS: Final = {
+HEADERS: Final = server.HEADERS | {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cache-Control": "no-cache",
+    )
 }
 PARTS: Final = ("meshcat.js", "scene.js", "licences.txt")
 """What every page with a 3D view needs."""
 _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".txt": "text/plain"}
 
 
-def routes(
-    scene: Newest,
-    *,
-    admit: Callable[[HTTPConnection], bool] | None = None,
-    authorize: Callable[[str | None], bool] | None = None,
-) -> list[BaseRoute]:
+def routes(scene: Newest, *, authorize: Callable[[str | None], bool] | None = None) -> list[BaseRoute]:
     """Make the routes of the page, of its files and of the WebSocket.
 
     Args:
         scene: What all viewers see.
-        admit: Whether a WebSocket may be opened, by its headers; None for this server's own pages, and programs.
         authorize: Whether a token lets a viewer in; None lets all in.
     """
-    viewers = Viewers(scene, admit, authorize)
+    viewers = Viewers(scene, authorize)
     return [*files("view", "interfaces.stream"), WebSocketRoute("/meshcat", viewers.serve)]
 
 
@@ -289,9 +277,9 @@ def _answer(request: Request, known: dict[str, str], name: str) -> Response:
 
 
 @lru_cache(maxsize=16)
-def _file(package: str, name: str) -> KeptFile:
+def _file(package: str, name: str) -> server.KeptFile:
     if name in ("meshcat.js", "licences.txt"):
         content = viewer_bundle()[name == "licences.txt"].encode()
     else:
         content = resources.files(package).joinpath(f"static/{name}").read_bytes()
-    return KeptFile.of(content)
+    return server.KeptFile.of(content)

@@ -80,7 +80,7 @@ class DrawnRoom:
             self._build(room)
 
     def _build(self, room: Room) -> None:
-        from robots.ipr.shapes import door_shape, person_shape, room_shapes
+        from robots.mobile.shapes import door_shape, person_shape, room_shapes
 
         things = tuple(
             replace(thing, height=min(thing.height, WALL)) if thing.name.startswith("wall") else thing

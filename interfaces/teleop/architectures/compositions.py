@@ -20,11 +20,10 @@ from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.base import MobileBase
 from robots.bullet.rooms import EMPTY, Room
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.model import CELL, CELLS
-from robots.ipr.navigation import mounts_of, outline_of
-from robots.ipr.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
-from robots.ipr.robot import MobileRobot
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.navigation import mounts_of, outline_of
+from robots.mobile.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
+from robots.mobile.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Posture
 from robots.onboard.following import PositionSource
@@ -68,6 +67,9 @@ ARCHITECTURES: Final[dict[str, Architecture]] = {
     "timeline": lambda _, posture: TimelineController(posture, now=0.0),
 }
 """What makes each architecture's controller."""
+ESTIMATING: Final = ("I", "II", "III", "III-capped", "extended")
+"""Architectures whose virtual robot is drawn where the posture estimator has it, as the paper's are. Of
+`timeline` the real robot plays the operator's path: where his commands lead is where it comes to."""
 
 
 def architecture(name: str) -> Architecture:
@@ -104,6 +106,10 @@ def controller(name: str, posture: Posture, constants: Constants) -> DriveContro
 
 CONTROL = 0.05
 """Period of the real robot's control [s]."""
+CELLS: Final = (125, 61)
+"""Cells of the virtual environment along x and y where there's no room; Han, Kim, Kim, Kim, 2001, section 3.2."""
+CELL: Final = 0.1
+"""Side of a cell [m], an assumption: a room of 12.5 m × 6.1 m, and a robot of about five cells across."""
 SENSING = ("extended",)
 """Architectures whose robot has sonars, and whose operator has the map of the room."""
 POSITIONS: Final[dict[str, Callable[[MobileRobot], PositionSource]]] = {

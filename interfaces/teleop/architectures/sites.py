@@ -76,19 +76,21 @@ class ArchitectureOperatorSite:
         posture: Posture,
         transport: Transport,
         *,
+        start: float = 0.0,
         gain: float = 0.5,
         surroundings: OperatorSurroundings | None = None,
     ) -> None:
-        """Begin at rest at time 0.
+        """Begin at rest.
 
         Args:
             model: The virtual robot.
             posture: Where both robots begin.
             transport: How packets go.
+            start: When they begin [s].
             gain: K_e of the posture estimator, in [0, 1].
             surroundings: The virtual environment that the virtual robot avoids, in the extended architecture.
         """
-        self._clock = ManualClock(0.0)
+        self._clock = ManualClock(start)
         engine = Engine(model, posture=posture, clock=self._clock)
         assert isinstance(engine, MobileEngine)
         self.engine: MobileEngine = engine
@@ -133,6 +135,18 @@ class ArchitectureOperatorSite:
         self._arcs.add(arc)
         self.posture = Posture(*advanced(self.posture, v, w, period))
         return self._packet(arc.end, self._tail(arc))
+
+    def estimated(self, t: float) -> Posture:
+        """Where the virtual robot is when the posture estimator moves it, eq. (8)–(10).
+
+        Args:
+            t: While the newest command lasts, or after it [s].
+        """
+        count, left = self.estimator.count, self.engine.timeline.end - t
+        if not count or left <= 0:
+            return Posture(*self.estimator.posture.tolist())
+        begun = max(0.0, self._model.period - left)
+        return Posture(*advanced(self.estimator.estimate(count - 1).tolist(), *self.before, begun))
 
     def repeat(self) -> ArcPacket:
         """What goes to the robot while the operator gives no command."""

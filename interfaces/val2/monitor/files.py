@@ -97,6 +97,24 @@ class Files:
         with _tried(path.name):
             write_whole(path, text.encode())
 
+    def delete(self, path: Path) -> None:
+        """Delete a file.
+
+        Raises:
+            ValError: If it can't be deleted.
+        """
+        with _tried(path.name):
+            path.unlink()
+
+    def rename(self, old: Path, new: Path) -> None:
+        """Give a file another name; one that has it is replaced.
+
+        Raises:
+            ValError: If it can't be.
+        """
+        with _tried(old.name):
+            old.replace(new)
+
     def listed(self) -> list[str]:
         """The names of the files in the directory, without the suffix.
 

@@ -10,7 +10,7 @@ from typing import Final
 from interfaces.val2 import context
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, running
-from interfaces.val2.monitor.control import ControlState, SharedController, SharedOperator
+from interfaces.val2.monitor.control import ControlState, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.state import Dialogue, Expects, OutputText, Question, Style, TerminalState, split_word
 
@@ -24,6 +24,8 @@ CONTROL_POLL: Final = 0.02
 """Time between two looks whether control was given [s]."""
 _URGENT: Final = frozenset({"ABORT", "PANIC"})
 """What doesn't wait."""
+_GREETING: Final = "", ""
+"""What waits for control at the beginning."""
 
 
 class TerminalMonitor:
@@ -37,7 +39,7 @@ class TerminalMonitor:
         *,
         queues_commands: bool = False,
         read_only: str = "",
-        person: SharedOperator | None = None,
+        session: str | None = None,
     ) -> None:
         """Begin; `start` greets.
 
@@ -48,10 +50,11 @@ class TerminalMonitor:
             queues_commands: Whether lines that can't be done while a program runs wait for its end; else they are
                 errors.
             read_only: Why this terminal only looks, whoever is in control.
-            person: Who sits here, where they command by a session of their own, too: control is theirs, and isn't
+            session: By which the person here commands from elsewhere, too: control is that session's, and isn't
                 asked for before a command needs it.
         """
-        self._person = person
+        self.session = session
+        """Whose right to command it asks for; None for the controller's own."""
         self._shared, self._queues_commands, self.read_only = shared, queues_commands, read_only
         self._listener = self.take
         self.state = TerminalState(shared.controller, shared.control, files, version)
@@ -62,10 +65,8 @@ class TerminalMonitor:
         """What a program asks."""
         self._waiting: deque[str] = deque()
         self._ended = False
-        self._control_due = math.inf
-        """When to see whether control was given [s]; infinity where it isn't waited for."""
         self._pending: tuple[str, str] | None = None
-        """The name and the line of a command that waits for control; None at the beginning."""
+        """The name and the line of a command that waits for control, empty at the beginning; None for none."""
         self._fault, self._checked_at = "", -math.inf
         self.done = False
         """Whether it's over: QUIT, or the end of the input."""
@@ -103,15 +104,10 @@ class TerminalMonitor:
         return self._in_control and (self.state.controller.running or self.state.controller.doing)
 
     @property
-    def _greets(self) -> bool:
-        """Whether control is asked for the first time, without a command."""
-        return self._control_due < math.inf and self._pending is None
-
-    @property
     def _busy(self) -> bool:
         """Whether lines wait: for an instruction, or for control."""
         works = self.state.work is not None or (self._in_control and self.state.controller.doing)
-        return self._control_due < math.inf or works
+        return self._pending is not None or works
 
     @property
     def busy(self) -> bool:
@@ -127,8 +123,8 @@ class TerminalMonitor:
         """Say what this is, and ask for control."""
         self.state.now = now
         self.state.say(f"{self.state.version}. HELP lists the commands.", style=Style.NOTE)
-        if self._person is None or self.read_only:
-            self._control_due = now
+        if self.session is None or self.read_only:
+            self._pending = _GREETING
         self.advance(now=now)
 
     def line(self, text: str, *, now: float) -> None:
@@ -209,10 +205,10 @@ class TerminalMonitor:
             self._end()
             return
         if not command.only_shows(rest):
-            answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
+            answer = self.read_only or self._shared.request(self._listener, self.session, now=self.state.now)
             if answer is ControlState.PENDING and command.name not in _URGENT:
                 self._waiting.appendleft(text)
-                self._control_due, self._pending = self.state.now + CONTROL_POLL, (command.name, text)
+                self._pending = command.name, text
                 return
             if isinstance(answer, str):
                 raise ValError("No control", f"{command.name}: {answer}")
@@ -288,8 +284,8 @@ class TerminalMonitor:
         """Do what is due: of the controller, of what is shown again and again, and lines that have waited."""
         self.state.now = now
         self._shared.advance(now=now)
-        if self._greets or now >= self._control_due:
-            self._settle_control()
+        if self._pending is not None:
+            self._settle_control(*self._pending)
         self._report_fault()
         if self._dialogue is not None and now >= self._asked.due:
             self._ask(self._dialogue, None)
@@ -298,32 +294,29 @@ class TerminalMonitor:
         self._release_scheduled()
         while self._waiting and not self.done and self._can_take(self._waiting[0]):
             self._take(self._waiting.popleft())
-            if self._control_due < math.inf:
+            if self._pending is not None:
                 break
             self._shared.advance(now=now)
             self._continue_steps()
         if self._ended and not self.done:
             self._finish()
 
-    def _settle_control(self) -> None:
+    def _settle_control(self, name: str, line: str) -> None:
         """See whether control was given; the line that asked for it waits."""
-        answer = self.read_only or self._shared.request(self._listener, self._person, now=self.state.now)
+        answer = self.read_only or self._shared.request(self._listener, self.session, now=self.state.now)
         if answer is ControlState.PENDING:
-            self._control_due = self.state.now + CONTROL_POLL
             return
-        pending, self._pending, self._control_due = self._pending, None, math.inf
-        if not isinstance(answer, str):
-            return
-        if pending is None:
+        self._pending = None
+        if isinstance(answer, str) and not name:
             self.state.say(f"*No control* {answer}: looking only", style=Style.NOTE)
-        elif self._waiting and self._waiting[0] is pending[1]:
+        elif isinstance(answer, str) and self._waiting and self._waiting[0] is line:
             self._waiting.popleft()
-            self.state.fail(ValError("No control", f"{pending[0]}: {answer}"))
+            self.state.fail(ValError("No control", f"{name}: {answer}"))
 
     def _report_fault(self) -> None:
         """Say when the robot has stopped by itself, or can't be reached; and when that's over."""
         self._checked_at = self.state.now
-        if self._greets:
+        if self._pending == _GREETING:
             return
         fault = self._shared.control.fault(now=self.state.now)
         before, self._fault = self._fault, "" if fault is None else str(fault)
@@ -365,5 +358,6 @@ class TerminalMonitor:
         if self.state.work is not None:
             return self._checked_at
         asked = math.inf if self._dialogue is None else self._asked.due
-        polled = self._checked_at + self._shared.control.fault_poll_interval
-        return min(self._shared.next_deadline(), self._control_due, asked, polled)
+        waits = self._pending is not None
+        polled = self._checked_at + (CONTROL_POLL if waits else self._shared.control.fault_poll_interval)
+        return min(self._shared.next_deadline(), asked, polled)

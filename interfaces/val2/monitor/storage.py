@@ -6,6 +6,7 @@ import dataclasses
 import re
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from interfaces.val2.errors import ValError
@@ -287,6 +288,29 @@ def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue:
         programs[new] = replace(program, name=new)
 
     yield from state.confirm(f"{new} exists. Replace it" if new in programs and new != old else "", act)
+
+
+def file_delete(state: TerminalState, rest: str) -> Dialogue:
+    """FDELETE file."""
+    path = _existing(state, rest)
+    yield from state.confirm(f"Delete {path.name}", lambda: state.files.delete(path))
+
+
+def file_rename(state: TerminalState, rest: str) -> Dialogue:
+    """FRENAME new=old."""
+    given, name = halves(rest)
+    if name is None:
+        raise ValError("Missing argument", "FRENAME new=old")
+    new, old = state.files.path(given), _existing(state, name)
+    question = f"{new.name} exists. Replace it" if new.exists() and new != old else ""
+    yield from state.confirm(question, lambda: state.files.rename(old, new))
+
+
+def _existing(state: TerminalState, name: str) -> Path:
+    path = state.files.path(name)
+    if not path.is_file():
+        raise ValError("Nonexistent file", path.name)
+    return path
 
 
 def zero(state: TerminalState, _rest: str) -> Dialogue:

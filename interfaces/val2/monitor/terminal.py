@@ -21,7 +21,7 @@ from prompt_toolkit.input.vt100 import Vt100Input
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.lexers import Lexer
 from prompt_toolkit.styles import Style
-from pygments.token import Token
+from prompt_toolkit.styles.pygments import pygments_token_to_classname
 
 from interfaces.timer import Turning
 from interfaces.val2.lexer import Val2Lexer
@@ -34,16 +34,6 @@ if TYPE_CHECKING:
     from prompt_toolkit.input import Input
     from prompt_toolkit.output import Output
 
-_CLASSES: Final = (
-    (Token.Comment, "class:comment"),
-    (Token.Keyword, "class:keyword"),
-    (Token.Literal.String, "class:string"),
-    (Token.Literal.Number, "class:number"),
-    (Token.Name.Builtin, "class:function"),
-    (Token.Name.Function, "class:function"),
-    (Token.Operator.Word, "class:keyword"),
-)
-
 
 def style() -> Style:
     """The colours; those that a terminal can't show, it leaves out."""
@@ -51,11 +41,13 @@ def style() -> Style:
         "prompt": "bold",
         "running": "bold ansiyellow",
         "command": "bold ansicyan",
-        "keyword": "ansicyan",
-        "function": "ansiblue",
-        "string": "ansigreen",
-        "number": "ansimagenta",
-        "comment": "italic ansibrightblack",
+        "pygments.keyword": "ansicyan",
+        "pygments.operator.word": "ansicyan",
+        "pygments.name.builtin": "ansiblue",
+        "pygments.name.function": "ansiblue",
+        "pygments.literal.string": "ansigreen",
+        "pygments.literal.number": "ansimagenta",
+        "pygments.comment": "italic ansibrightblack",
         "error": "ansired",
         "note": "ansibrightblack",
         "answer": "",
@@ -91,8 +83,7 @@ class LineLexer(Lexer):
 
     def _coloured(self, text: str) -> StyleAndTextTuples:
         return [
-            (next((name for family, name in _CLASSES if kind in family), ""), piece)
-            for kind, piece in self._lexer.get_tokens(text)
+            (f"class:{pygments_token_to_classname(kind)}", piece) for kind, piece in self._lexer.get_tokens(text)
         ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from interfaces.val2.motion.arm import Arm
-from interfaces.val2.motion.robot import CommandOutcome, EngineRobot, RobotPort, SiteRobot
+from interfaces.val2.motion.robot import EngineRobot, RobotPort, SiteRobot
 
 if TYPE_CHECKING:
     from collections.abc import MutableMapping
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from interfaces.stream.connection import Connection
     from vrs.engine import Engine
 
-__all__ = ["Arm", "CommandOutcome", "EngineRobot", "RobotPort", "SiteRobot", "arm_for"]
+__all__ = ["Arm", "EngineRobot", "RobotPort", "SiteRobot", "arm_for"]
 
 
 def arm_for(robot: Engine | Connection, *, parameters: MutableMapping[str, float] | None = None) -> Arm:

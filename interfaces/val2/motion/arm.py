@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from collections.abc import MutableMapping
+from collections.abc import Iterable, MutableMapping
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from interfaces.clients.designer import Issued
 from interfaces.messages import RefusalCode
 from interfaces.teleop.halt import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
@@ -29,13 +30,13 @@ from interfaces.val2.motion.places import (
     in_millimetres,
     location_error,
     shifted,
-    with_word,
 )
-from interfaces.val2.motion.robot import CommandOutcome, RobotPort
+from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
+from vrs.ledger import Receipt
 from vrs.model import Array
 
 _POLL: Final = 0.01
@@ -51,6 +52,8 @@ _ELSEWHERE: Final = 1e-5
 """Joints of an end that differ by more from the destination [rad]."""
 _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
+_LISTED: Final = 256
+"""Newest commands that are looked through for what isn't over."""
 
 
 class Arm(SettingsInForce):
@@ -89,25 +92,21 @@ class Arm(SettingsInForce):
         self._continuous = True
         self._dry: Array | None = None
         """Where a dry run would be by now [rad], (6,); None outside of one."""
-        self._words: tuple[str, ...] = ()
         self._at: float | None = None
         self._delay: tuple[float, float] | None = None
         """When a DELAY may begin at the earliest, and how long it lasts [s]."""
-        self._unanswered: list[tuple[int, bool]] = []
-        """What has no answer yet, and whether it's a straight line."""
+        self._unanswered: deque[int] = deque()
+        """What has no answer yet."""
         self._recent: deque[tuple[int, MotionCommand]] = deque(maxlen=_RECENT)
         self._interrupted: tuple[MotionCommand, ...] = ()
         self._asked_ahead: tuple[int, ...] = ()
         """What was asked for ahead when somebody else took the arm over."""
-        self._cancels: list[int] = []
-        """What was asked for to take those out of the plan, and has no answer."""
         self._awaited: int | None = None
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._correction: int | None = None
         """The newest correction by ALTOUT."""
         self._last_settings = MotionSettings()
         """How the newest motion was asked for."""
-        self._last_words: tuple[str, ...] = ()
         self._now = -math.inf
 
     # Where it is.
@@ -123,7 +122,7 @@ class Arm(SettingsInForce):
 
     def real(self, *, now: float) -> Where | None:
         """Where the other twin was measured last; None where there's none."""
-        q = self.robot.real(now=now)
+        q = self.robot.other.q
         return None if q is None else self._frames.where(q, self._hand.opening(now))
 
     def past(self, t: float, *, now: float) -> Where:
@@ -155,7 +154,6 @@ class Arm(SettingsInForce):
     def _update(self, now: float) -> None:
         self._now = now
         self._pace.advance(now=now)
-        self._cancels = [n for n in self._cancels if self.robot.outcome(n, now=now) is None]
         self._hand.begin(self._begins, now)
 
     def _begins(self, number: int) -> float | None:
@@ -183,13 +181,12 @@ class Arm(SettingsInForce):
         """
         self._update(now)
         while self._unanswered:
-            number, straight = self._unanswered[0]
-            outcome = self.robot.outcome(number, now=now)
+            outcome = self.robot.outcome(self._unanswered[0], now=now)
             if outcome is None:
                 return False
-            self._unanswered.pop(0)
+            self._unanswered.popleft()
             if outcome.reason:
-                raise _refusal(outcome, straight)
+                raise _refusal(outcome)
         self._check_interrupted(now)
         return not self._pace.waits
 
@@ -201,7 +198,7 @@ class Arm(SettingsInForce):
         """
         if self._awaited is None or (outcome := self.robot.outcome(self._awaited, now=now)) is None:
             return
-        receipt, why = outcome.receipt, self.robot.halt_reason()
+        receipt, why = outcome.receipt, self.robot.other.halted
         if receipt is None or receipt.q is None or receipt.undone:
             self._awaited = None
             return
@@ -233,8 +230,8 @@ class Arm(SettingsInForce):
             if begins is not None and begins <= now < over
         )
         if self._moves(-math.inf) and (motions[-1][1] is None or motions[-1][1] > now):
-            self.next, self._words = self._last_settings, self._last_words
-            self._hand.give_back()
+            self.next = self._last_settings
+            self._hand.forget()
         self._recent.clear()
         self._delay = self._at = self._awaited = None
 
@@ -257,7 +254,7 @@ class Arm(SettingsInForce):
 
     def _nulled(self, now: float) -> bool:
         """Whether the other twin is there, where a motion was to end so."""
-        q = self.robot.real(now=now) if self._last_settings.nulling and self._dry is None else None
+        q = self.robot.other.q if self._last_settings.nulling and self._dry is None else None
         if q is None or now >= self._end() + _NULL_PATIENCE:
             return True
         allowed = (_FINE if self._last_settings.fine else _COARSE) * self._last_settings.tolerance / 100.0
@@ -282,13 +279,19 @@ class Arm(SettingsInForce):
         """Whether the arm is on a motion that a program or the monitor asked for, and no correction by ALTOUT."""
         return bool(self._recent) and self._recent[-1][0] != self._correction and now < self.robot.timeline.end
 
-    def _send(self, command: Command | None, straight: bool, now: float) -> int:
+    def _send(self, command: Command, now: float) -> int:
         number = self.robot.ask(command, now=now)
         outcome = self.robot.outcome(number, now=now)
         if outcome is None:
-            self._unanswered.append((number, straight))
+            self._unanswered.append(number)
         elif outcome.reason:
-            raise _refusal(outcome, straight)
+            raise _refusal(outcome)
+        return number
+
+    def _go(self, command: MotionCommand, now: float) -> int:
+        """Ask for a motion, at whose destination the arm is to arrive."""
+        number = self._awaited = self._send(command, now)
+        self._recent.append((number, command))
         return number
 
     # Motions.
@@ -368,8 +371,7 @@ class Arm(SettingsInForce):
                 pace=bounded(self._pace.pace),
                 tool=self._frames.tip(),
             )
-            self._correction = self._awaited = number = self._send(command, True, now)
-            self._recent.append((number, command))
+            self._correction = self._go(command, now)
             self._delay = None
         self._alterations.taken(place)
 
@@ -384,16 +386,19 @@ class Arm(SettingsInForce):
     ) -> None:
         """Ask for a motion; nothing is changed where it can't be."""
         self._update(now)
-        near, manner = self._goal(), self.next
         turns = not straight and isinstance(target, Transformation)
-        words = self._words if turns else ()
+        near, words = self._goal(), self.next.words
+        manner = self.next if hand is None else replace(self.next, hand=hand)
+        manner = manner if turns else replace(manner, words=())
         if self._dry is not None:
-            self._dry = self._frames.solve(target, near, words)
+            self._dry = self._frames.solve(target, near, manner.words)
         else:
             rolls = self._continuous and self._delay is None and self._at is None
-            rolls = rolls and set(words) <= set(self._frames.configured(near) if words else ())
+            rolls = rolls and set(manner.words) <= set(self._frames.configured(near) if manner.words else ())
             command = MotionCommand(
-                target=self._target(target, straight, near, words),
+                target=PoseTarget(self._frames.pose(target))
+                if straight and isinstance(target, Transformation)
+                else JointTarget(self._frames.solve(target, near, manner.words)),
                 execute_at=self._start(now),
                 speed=self._speed_share(target, straight, near, manner.speed if speed is None else speed),
                 motion=Motion.LINE if straight else Motion.JOINT,
@@ -405,22 +410,12 @@ class Arm(SettingsInForce):
             )
             if manner.duration > 0:
                 command = self._stretched(command, near, manner.duration)
-            number = self._send(command, straight, now)
-            self._recent.append((number, command))
-            self._awaited = number
-            self._hand.ask(number, hand)
+            number = self._go(command, now)
+            if manner.hand is not None or manner.relaxes:
+                self._hand.ask(number, manner.hand)
             self._hand.begin(self._begins, now)
-        self._last_settings, self._last_words, self._delay, self._at = manner, words, None, None
-        self.taken()
-        if turns:
-            self._words = ()
-
-    def _target(
-        self, target: Location, straight: bool, near: Array, words: tuple[str, ...]
-    ) -> JointTarget | PoseTarget:
-        if straight and isinstance(target, Transformation):
-            return PoseTarget(self._frames.pose(target))
-        return JointTarget(self._frames.solve(target, near, words))
+        self._last_settings, self._delay, self._at = manner, None, None
+        self.next = self.always if turns else replace(self.always, words=words)
 
     def _start(self, now: float) -> float | None:
         """When the next motion is to begin [s]; None for as soon as it can."""
@@ -449,7 +444,7 @@ class Arm(SettingsInForce):
         self._update(now)
         self._give_up(now, self.robot.timeline.end)
         if now < self.robot.timeline.end or self._unanswered:
-            self._send(Stop(), False, now)
+            self._send(Stop(), now)
 
     def give_up(self, *, now: float) -> None:
         """Somebody else commands the arm: what isn't over is for RETRY, and no answer is waited for any more."""
@@ -467,7 +462,7 @@ class Arm(SettingsInForce):
             outcome = self.robot.outcome(number, now=now)
             receipt = None if outcome is None else outcome.receipt
             if receipt is not None and receipt.stands:
-                self._cancels.append(self.robot.ask(Cancel(receipt.command_id), now=now))
+                self.robot.ask(Cancel(receipt.command_id), now=now)
 
     def retry(self, *, now: float) -> bool:
         """Ask again for the motion that `brake` interrupted; False if there was none."""
@@ -475,9 +470,7 @@ class Arm(SettingsInForce):
         interrupted, self._interrupted = self._interrupted, ()
         for command in interrupted:
             again = replace(command, execute_at=None, pace=bounded(self._pace.pace))
-            number = self._send(again, command.motion is Motion.LINE, now)
-            self._recent.append((number, again))
-            self._awaited = number
+            self._go(again, now)
         return bool(interrupted)
 
     # The timeline.
@@ -487,10 +480,11 @@ class Arm(SettingsInForce):
         self._update(now)
         self._interrupted, self._delay, self._awaited = (), None, None
         self._hand.forget()
+        self.next = replace(self.next, hand=None, relaxes=False)
         number = self.robot.ask(None, now=now)
         outcome = self.robot.outcome(number, now=now)
         if outcome is None:
-            self._unanswered.append((number, False))
+            self._unanswered.append(number)
             return "The newest command is taken back"
         if outcome.reason or outcome.receipt is None:
             return "Nothing was taken back" + (f": {outcome.reason}" if outcome.reason else "")
@@ -500,22 +494,19 @@ class Arm(SettingsInForce):
         """TIMELINE: number, begin, end and destination of what is scheduled."""
         self._update(now)
         lines = []
-        for receipt in self.robot.scheduled(now=now):
-            q = receipt.q
-            joints = "" if q is None else self._spelled(q)
+        newest = self.robot.newest
+        outcomes = (self.robot.outcome(n, now=now) for n in range(max(newest - _LISTED, 0) + 1, newest + 1))
+        for receipt in _standing((o.receipt for o in outcomes if o is not None and o.receipt is not None), now):
+            joints = ""
+            if receipt.q is not None:
+                at = self._frames.where(receipt.q, 0.0).joints
+                joints = " ".join(f"{value:8.2f}" for value in at.joints)
             lines.append(
                 f"{receipt.command_id:6d} {receipt.execute_at:10.3f} {receipt.end:10.3f}  {joints}".rstrip()
             )
         return lines
 
-    def _spelled(self, q: Array) -> str:
-        return " ".join(f"{value:8.2f}" for value in self._frames.where(q, 0.0).joints.joints)
-
     # For the next motion, or those after it.
-
-    def set_hand(self, hand: bool | None) -> None:
-        """OPEN, CLOSE, RELAX: with the next motion."""
-        self._hand.wanted, self._hand.relax = hand, hand is None
 
     def fastest(self, unit: str) -> float:
         """The greatest program speed that counts, in a unit of `%`, `MMPS` or `IPS`."""
@@ -524,10 +515,6 @@ class Arm(SettingsInForce):
     def tolerance(self) -> tuple[bool, float]:
         """Whether FINE is in force, and its percentage."""
         return self.next.fine, self.next.tolerance
-
-    def set_configuration(self, word: str) -> None:
-        """RIGHTY, LEFTY, ABOVE, BELOW, FLIP, NOFLIP: at the next joint-interpolated motion."""
-        self._words = with_word(self._words, word)
 
     # At once.
 
@@ -581,13 +568,12 @@ class Arm(SettingsInForce):
 
     def begin_program(self) -> None:
         """EXECUTE: speeds, tolerances and requests are as at the beginning."""
-        self.reset()
-        self._hand.wanted, self._hand.relax = None, False
-        self._words, self._at, self._interrupted = (), None, ()
+        self.always = self.next = MotionSettings()
+        self._at, self._interrupted = None, ()
         self._alterations.set(None)
 
 
-def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
+def _refusal(outcome: Issued) -> ValError:
     """What a refusal is in VAL's words."""
     if outcome.code is RefusalCode.OVERRULED:
         return ValError("Motion interrupted", TAKEN)
@@ -596,8 +582,28 @@ def _refusal(outcome: CommandOutcome, straight: bool) -> ValError:
     if outcome.code is RefusalCode.NOT_FOLLOWING:
         why = outcome.reason.removeprefix(f"{NOT_FOLLOWING}: ").removesuffix("; resume first")
         return robot_halted(why)
-    if straight:
+    if isinstance(outcome.command, MotionCommand) and outcome.command.motion is Motion.LINE:
         return ValError(
             "Straight line not possible", in_millimetres(outcome.reason.removeprefix("no straight line: "))
         )
     return location_error(outcome.reason)
+
+
+def _standing(receipts: Iterable[Receipt], now: float) -> tuple[Receipt, ...]:
+    """Those that are to be carried out and aren't over at a time [s], in the order of their beginning."""
+    known = {receipt.command_id: receipt for receipt in receipts if receipt.end is not None and not receipt.undone}
+    chosen = []
+    for receipt in known.values():
+        by = known.get(receipt.superseded_by or 0)
+        # One that the next begins before it's over gives way to that; anything else drops it.
+        if by is not None and by.q is not None and receipt.q is not None:
+            after = known.get(by.superseded_by or 0, by)
+            begins = min(by.execute_at or 0.0, after.execute_at or 0.0)
+            lasting = replace(receipt, end=begins)
+        elif receipt.superseded_by is None:
+            lasting = receipt
+        else:
+            continue
+        if (lasting.end or 0.0) > now:
+            chosen.append(lasting)
+    return tuple(sorted(chosen, key=lambda receipt: (receipt.execute_at or 0.0, receipt.command_id)))

@@ -61,10 +61,6 @@ class Hand:
         self._movements = deque([_Movement(-math.inf, -math.inf, OPEN, OPEN)], maxlen=REMEMBERED)
         self._holds = False
         self._orders: list[_Order] = []
-        self.wanted: float | bool | None = None
-        """What goes with the next motion: an opening [mm], open or closed; None for nothing."""
-        self.relax = False
-        """Whether the next motion relaxes it."""
 
     @property
     def end(self) -> float:
@@ -101,13 +97,8 @@ class Hand:
         return movement.opening(t)
 
     def ask(self, number: int, hand: float | bool | None) -> None:
-        """Let it move when a motion begins: as the motion says, else as was asked for the next one."""
-        wanted = self.wanted if hand is None else hand
-        if wanted is not None:
-            self._orders.append(_Order(number, *_meaning(wanted)))
-        elif self.relax:
-            self._orders.append(_Order(number, self.goal, holds=False))
-        self.wanted, self.relax = None, False
+        """Let it move, or relax (None), when a motion begins."""
+        self._orders.append(_Order(number, *((self.goal, False) if hand is None else _meaning(hand))))
 
     def begin(self, started: Callable[[int], float | None], now: float) -> None:
         """Move for every motion that has begun; the callable says when it did [s], None for not yet."""
@@ -122,18 +113,9 @@ class Hand:
         """Open (True), close or relax (None) it now."""
         self._move(*((self._to, False) if hand is None else _meaning(hand)), now)
 
-    def give_back(self) -> None:
-        """What was asked for a motion that doesn't come is for the next one."""
-        if self._orders:
-            order = self._orders[-1]
-            self.relax = not order.holds and order.to == self._to
-            self.wanted = None if self.relax else order.to
-            self._orders.clear()
-
     def forget(self) -> None:
         """Drop what was asked for motions to come."""
         self._orders.clear()
-        self.wanted, self.relax = None, False
 
     def _movement(self, to: float, t: float, before: float) -> _Movement:
         return _Movement(t, t + max(self._parameters.get("HAND.TIME", HAND_TIME), 0.0), before, to)

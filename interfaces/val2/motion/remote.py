@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from typing_extensions import override
 
 from interfaces.clients.designer import Issued
-from interfaces.val2.motion.robot import CommandOutcome, RobotPort, standing
+from interfaces.messages.control import State, Welcome
+from interfaces.val2.motion.robot import OtherTwin, RobotPort
 from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt
-from vrs.model import Array, RobotModel
+from vrs.model import RobotModel
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from interfaces.messages.control import State
     from interfaces.stream.connection import Connection
 
 _PATIENCE: Final = 2.0
 """How long an answer waits for the edit that it speaks of to come, too [s]: a motion's from its end on."""
-_FAULT_POLL: Final = 0.05
-"""How often it's looked whether the real robot has stopped by itself [s]."""
 _FETCHED: Final = 10.0
 """How long the timeline may take to come at first [s]."""
 _SAME: Final = 1e-6
@@ -31,6 +30,8 @@ _SAME: Final = 1e-6
 
 class RemoteRobot(RobotPort):
     """An engine at the other end of a connection. Nothing waits: what was asked for is answered later."""
+
+    fault_poll_interval = 0.05
 
     def __init__(self, connection: Connection, model: RobotModel) -> None:
         """Follow a robot.
@@ -45,6 +46,7 @@ class RemoteRobot(RobotPort):
         self._connection, self._model = connection, model
         self._viewer = connection.viewer(rate=10.0)
         self._asked: dict[int, tuple[Command | None, Timeline]] = {}
+        self.newest = 0
         self._open: int | None = None
         """The newest that has no answer yet."""
         self._outdated: State | None = None
@@ -77,31 +79,32 @@ class RemoteRobot(RobotPort):
         designer = self._connection.designer
         number = (designer.undo() if command is None else designer.issue(command)).number
         self._asked[number] = command, before
-        self._open = number
+        self._open = self.newest = number
         return number
 
     @override
-    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
+    def outcome(self, number: int, *, now: float) -> Issued | None:
         """What became of it, once the timeline shows it."""
         try:
             issued = self._connection.designer.issued(number)
         except UnknownCommandError:
-            return CommandOutcome()
+            return Issued(number, None, now, now)
         if issued.answered_at is None:
             return None
         if number == self._open:
             self._open, self._outdated = None, self._connection.state
-        outcome = CommandOutcome(issued.receipt, issued.refusal, issued.code)
-        if outcome.reason or number not in self._asked:
-            return outcome
+        if issued.reason or number not in self._asked:
+            return issued
         command, before = self._asked[number]
-        if not (self._shows(command, issued.receipt, before) or self.halt_reason()):
+        if not (self._shows(command, issued.receipt, before) or self.other.halted):
             if now < self._patience(issued) + _PATIENCE:
                 return None
             if isinstance(command, MotionCommand) and not self._leads_to(issued.receipt):
-                outcome = CommandOutcome(refusal="the server took it, but doesn't show what the arm does")
+                issued = replace(
+                    issued, receipt=None, refusal="the server took it, but doesn't show what the arm does"
+                )
         del self._asked[number]
-        return outcome
+        return issued
 
     @staticmethod
     def _patience(issued: Issued) -> float:
@@ -123,30 +126,18 @@ class RemoteRobot(RobotPort):
         q = None if receipt is None else receipt.q
         return q is None or bool(np.abs(self.timeline.final() - q).max() <= _SAME)
 
+    @property
     @override
-    def halt_reason(self) -> str:
+    def other(self) -> OtherTwin:
         state = self._connection.state
-        return "" if state is None or state is self._outdated else state.halted
+        if state is None:
+            return OtherTwin()
+        return OtherTwin(state.q, "" if state is self._outdated else state.halted)
 
     @property
     @override
     def lost(self) -> bool:
         return not self._connection.is_connected
-
-    @property
-    @override
-    def fault_poll_interval(self) -> float:
-        return _FAULT_POLL
-
-    @override
-    def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
-        receipts = (issued.receipt for issued in self._connection.designer.history)
-        return standing((receipt for receipt in receipts if receipt is not None), now)
-
-    @override
-    def real(self, *, now: float) -> Array | None:
-        state = self._connection.state
-        return None if state is None else state.q
 
     def close(self) -> None:
         """Follow no more; the connection stays."""
@@ -162,6 +153,7 @@ def remote_robot(connection: Connection) -> RemoteRobot:
     from robots import puma560
 
     welcome = connection.welcome
+    assert isinstance(welcome, Welcome)
     model = puma560.model(limits=welcome.limits)
     if welcome.robot != model.name:
         raise InvalidValueError("robot", welcome.robot, f"{model.name}: VAL-II moves no other")

@@ -1,48 +1,46 @@
-"""What motions need of a robot: somewhere to send commands, and its timeline; robots in this process."""
+"""What motions need of a robot: somewhere to send commands, its timeline, and how the other twin is."""
 
 from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeAlias
 
 from typing_extensions import override
 
-from interfaces.messages import RefusalCode
+from interfaces.clients.designer import Issued
+from interfaces.messages import Refusal, RefusalCode
 from interfaces.teleop.halt import text_of
 from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_arm import VirtualArm
 from vrs.clock import ManualClock
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import VrsError
-from vrs.ledger import Receipt, Status
+from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel
 from vrs.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CommandOutcome:
-    """What became of something that was asked for."""
+class OtherTwin:
+    """What is known of the twin that isn't the operator's."""
 
-    receipt: Receipt | None = None
-    """As later commands left it; None where there's none."""
-    refusal: str = ""
-    """Why it couldn't be taken at all."""
-    code: RefusalCode = RefusalCode.OTHER
-    """Why nothing came of it, where that's decided by."""
-
-    @property
-    def reason(self) -> str:
-        """Why nothing came of it; empty where something did."""
-        if self.receipt is not None and self.receipt.status is Status.REJECTED:
-            return self.receipt.reason
-        return self.refusal
+    q: Array | None = None
+    """Joints as they were measured last [rad], (n,); None where there's none."""
+    halted: str = ""
+    """Why it doesn't follow, having stopped by itself; empty while it does."""
 
 
 class RobotPort(Protocol):
     """A robot's timeline, and the way to it. Times are session time [s]."""
+
+    fault_poll_interval: float
+    """How often it's to be asked for trouble while it moves [s]; infinity where its driver does so anyway."""
+    newest: int
+    """Number of the newest thing that was asked for; 0 before."""
 
     @property
     def model(self) -> RobotModel:
@@ -52,6 +50,14 @@ class RobotPort(Protocol):
     def timeline(self) -> Timeline:
         """What the operator's twin did and will do, as far as it's known."""
 
+    @property
+    def other(self) -> OtherTwin:
+        """How the other twin is."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing can be heard of it now."""
+
     def ask(self, command: Command | None, *, now: float) -> int:
         """Ask for something; None takes back the newest command.
 
@@ -59,43 +65,35 @@ class RobotPort(Protocol):
             The number by which `outcome` tells what came of it.
         """
 
-    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
-        """What became of it by now; None while nothing was heard."""
-
-    def halt_reason(self) -> str:
-        """Why the other twin doesn't follow, having stopped by itself; empty while it does."""
-
-    @property
-    def lost(self) -> bool:
-        """Whether nothing can be heard of it now."""
-
-    @property
-    def fault_poll_interval(self) -> float:
-        """How often it's to be asked for trouble while it moves [s]; infinity where its driver does so anyway."""
-
-    def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
-        """Receipts of what isn't over, in the order of their beginning."""
-
-    def real(self, *, now: float) -> Array | None:
-        """Joints of the other twin as they were measured last [rad], (n,); None where there's none."""
+    def outcome(self, number: int, *, now: float) -> Issued | None:
+        """What became of it by now, as later commands left it; None while nothing was heard, or it's forgotten."""
 
 
-_REMEMBERED: Final = 64
+Execute: TypeAlias = Callable[[Command | None, float], Receipt | Refusal | None]
+"""Carries a command out at a time [s], or takes back the newest where it's None; None where there's none."""
+REMEMBERED: Final = 256
 """Answers that are kept."""
-_LOOKED: Final = 256
-"""Newest receipts that are looked through for what isn't over."""
 
 
 class EngineRobot(RobotPort):
     """An engine in this process; a manual clock of it is set to the time of each call."""
 
     lost = False
-    fault_poll_interval = math.inf
 
-    def __init__(self, engine: Engine) -> None:
-        self.engine = engine
-        self._number = 0
-        self._outcomes: OrderedDict[int, CommandOutcome] = OrderedDict()
+    def __init__(
+        self, engine: Engine, execute: Execute | None = None, *, fault_poll_interval: float = math.inf
+    ) -> None:
+        """Reach an engine.
+
+        Args:
+            engine: The engine.
+            execute: The way to it, where it isn't called directly.
+            fault_poll_interval: See `RobotPort`.
+        """
+        self.engine, self.fault_poll_interval = engine, fault_poll_interval
+        self._execute = self._directly if execute is None else execute
+        self._issued: OrderedDict[int, Issued] = OrderedDict()
+        self.newest = 0
 
     @property
     @override
@@ -107,25 +105,29 @@ class EngineRobot(RobotPort):
     def timeline(self) -> Timeline:
         return self.engine.timeline
 
+    @property
+    @override
+    def other(self) -> OtherTwin:
+        return OtherTwin()
+
     @override
     def ask(self, command: Command | None, *, now: float) -> int:
-        self._number += 1
+        number = self.newest = self.newest + 1
         try:
-            answer = self._do(command, now)
-            refusal = "" if answer is not None else "there's nothing to take back"
+            answer = self._execute(command, now) or Refusal("there's nothing to take back")
         except VrsError as error:
-            answer, refusal = None, str(error)
-        code = RefusalCode.OTHER if answer is None else self._code(answer)
-        self._outcomes[self._number] = CommandOutcome(answer, refusal, code)
-        if len(self._outcomes) > _REMEMBERED:
-            self._outcomes.popitem(last=False)
-        return self._number
+            answer = Refusal(str(error))
+        if isinstance(answer, Refusal):
+            self._issued[number] = Issued(number, command, now, now, refusal=answer.text, code=answer.code)
+        else:
+            known = self.engine.refusal(answer.command_id)
+            code = known if isinstance(known, RefusalCode) else RefusalCode.OTHER
+            self._issued[number] = Issued(number, command, now, now, answer, code=code)
+        if len(self._issued) > REMEMBERED:
+            self._issued.popitem(last=False)
+        return number
 
-    def _code(self, answer: Receipt) -> RefusalCode:
-        known = self.engine.refusal(answer.command_id) if answer.status is Status.REJECTED else None
-        return known if isinstance(known, RefusalCode) else RefusalCode.OTHER
-
-    def _do(self, command: Command | None, now: float) -> Receipt | None:
+    def _directly(self, command: Command | None, now: float) -> Receipt | None:
         clock = self.engine.clock
         if isinstance(clock, ManualClock):
             clock.set(max(now, clock.now()))
@@ -134,80 +136,30 @@ class EngineRobot(RobotPort):
         return self.engine.execute(command)  # type: ignore[arg-type]
 
     @override
-    def outcome(self, number: int, *, now: float) -> CommandOutcome | None:
+    def outcome(self, number: int, *, now: float) -> Issued | None:
         """What became of it; of one that's long over, nothing but that it's over."""
-        outcome = self._outcomes.get(number)
-        if outcome is None:
-            return CommandOutcome()
-        receipt = outcome.receipt
-        if receipt is None or receipt.status is Status.REJECTED:
-            return outcome
-        return CommandOutcome(self.engine.receipt(receipt.command_id))
-
-    @override
-    def halt_reason(self) -> str:
-        return ""
-
-    @override
-    def scheduled(self, *, now: float) -> tuple[Receipt, ...]:
-        newest = self.engine.newest
-        numbers = range(max(newest - _LOOKED, 0) + 1, newest + 1)
-        return standing((self.engine.receipt(number) for number in numbers), now)
-
-    @override
-    def real(self, *, now: float) -> Array | None:
-        return None
+        issued = self._issued.get(number) or Issued(number, None, now, now)
+        if issued.receipt is None or issued.reason:
+            return issued
+        return replace(issued, receipt=self.engine.receipt(issued.receipt.command_id))
 
 
 class SiteRobot(EngineRobot):
-    """The operator's site of the laboratory."""
+    """The operator's site, of the laboratory or a server's own."""
 
     def __init__(
-        self, site: OperatorSite, executed: Callable[[float, Command, Receipt], None] | None = None
+        self,
+        site: OperatorSite[VirtualArm],
+        execute: Execute | None = None,
+        *,
+        fault_poll_interval: float = math.inf,
     ) -> None:
-        """Reach a site.
+        """Reach a site; see `EngineRobot`."""
+        super().__init__(site.robot.engine, execute, fault_poll_interval=fault_poll_interval)
+        self._site = site
 
-        Args:
-            site: The operator's.
-            executed: Is called with what was carried out, and when [s].
-        """
-        super().__init__(site.engine)
-        self._site, self._executed = site, executed
-
-    def _do(self, command: Command | None, now: float) -> Receipt | None:
-        if command is None:
-            return self._site.undo(now=now)
-        answer = self._site.execute(command, now=now)
-        assert isinstance(answer, Receipt)
-        if self._executed is not None and answer.status is not Status.REJECTED:
-            self._executed(now, command, answer)
-        return answer
-
+    @property
     @override
-    def halt_reason(self) -> str:
-        return text_of(self._site.halted)
-
-    @override
-    def real(self, *, now: float) -> Array | None:
-        report = self._site.report
-        return None if report is None else report.q
-
-
-def standing(receipts: Iterable[Receipt], now: float) -> tuple[Receipt, ...]:
-    """Those that are to be carried out and aren't over at a time [s], in the order of their beginning."""
-    known = {receipt.command_id: receipt for receipt in receipts if receipt.end is not None and not receipt.undone}
-    chosen = []
-    for receipt in known.values():
-        by = known.get(receipt.superseded_by or 0)
-        # One that the next begins before it's over gives way to that; anything else drops it.
-        if by is not None and by.q is not None and receipt.q is not None:
-            after = known.get(by.superseded_by or 0, by)
-            begins = min(by.execute_at or 0.0, after.execute_at or 0.0)
-            lasting = replace(receipt, end=begins)
-        elif receipt.superseded_by is None:
-            lasting = receipt
-        else:
-            continue
-        if (lasting.end or 0.0) > now:
-            chosen.append(lasting)
-    return tuple(sorted(chosen, key=lambda receipt: (receipt.execute_at or 0.0, receipt.command_id)))
+    def other(self) -> OtherTwin:
+        site = self._site
+        return OtherTwin(None if site.report is None else site.report.q, site.gone or text_of(site.halted))

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from interfaces.val2.errors import ValError
+from interfaces.val2.motion.places import with_word
 from interfaces.val2.motion.robot import RobotPort
 from vrs.commands import ScaleTime
 from vrs.model import Array, RobotModel
@@ -81,22 +82,27 @@ class MotionSettings:
     """How near counts as there [%]."""
     nulling: bool = False
     """Whether its end waits for the other twin."""
+    words: tuple[str, ...] = ()
+    """What is asked for of the configuration."""
+    hand: float | bool | None = None
+    """What the hand does as it begins: an opening [mm], open or closed; None for nothing."""
+    relaxes: bool = False
+    """Whether the hand is relaxed then."""
 
 
 class SettingsInForce:
     """What holds for the next motion, and what for all after it."""
 
     def __init__(self) -> None:
-        self.always = MotionSettings()
-        self.next = MotionSettings()
-
-    def reset(self) -> None:
-        """Be as at the beginning of a program."""
         self.always = self.next = MotionSettings()
 
-    def taken(self) -> None:
-        """A motion was made: what was for it alone is over."""
-        self.next = self.always
+    def set_hand(self, hand: bool | None) -> None:
+        """OPEN, CLOSE, RELAX: with the next motion."""
+        self._change(False, hand=hand, relaxes=hand is None)
+
+    def set_configuration(self, word: str) -> None:
+        """RIGHTY, LEFTY, ABOVE, BELOW, FLIP, NOFLIP: at the next joint-interpolated motion to a transformation."""
+        self._change(False, words=with_word(self.next.words, word))
 
     def _change(self, always: bool, **changes: object) -> None:
         self.next = replace(self.next, **changes)  # type: ignore[arg-type]

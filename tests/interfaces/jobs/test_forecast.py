@@ -6,10 +6,11 @@ import math
 
 import pytest
 
-from interfaces.jobs import dry_run, time_needed
+from interfaces.jobs import dry_run
 from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import (
     ArmJob,
+    Forecast,
     JobList,
     JobStage,
     ListCommand,
@@ -21,7 +22,13 @@ from interfaces.messages.jobs import (
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import RouteConfig, RouteMap
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.teleop.rig import MODEL, Rig
+
+
+def end(forecast: Forecast) -> float:
+    """When a list is likely to be done [s]."""
+    return forecast[-1].begins + (forecast[-1].lasts or 0.0)
+
 
 OPEN = RouteMap((10.0, 8.0), [], RouteConfig(0.4, 0.25))
 
@@ -30,8 +37,9 @@ def test_a_move_takes_what_the_limits_say() -> None:
     forecast = dry_run(JobList((MoveJob(1, Goal(6.0, 2.0)),)), Posture(1.0, 2.0, 0.0), OPEN, MODEL.limits)
     # 5 m straight ahead can't take less than at 0.5 m/s, with what speeding up and braking need.
     fastest = 5.0 / 0.5 + 0.5 / 0.52
-    assert fastest <= time_needed(forecast) <= 1.6 * fastest
     (move,) = forecast
+    assert move.lasts is not None
+    assert fastest <= move.lasts <= 1.6 * fastest
     assert move.route == ((1.0, 2.0), (6.0, 2.0))
 
 
@@ -51,25 +59,24 @@ def test_each_move_begins_where_the_one_before_ended() -> None:
 def test_a_program_takes_what_somebody_says_or_fails() -> None:
     jobs = JobList((ArmJob(1, "pick"), WaitJob(2, 1.0)))
     here = Posture(1.0, 2.0, 0.0)
-    assert time_needed(dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda _: 7.5)) == 8.5
+    assert end(dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda _: 7.5)) == 8.5
     failing = dry_run(jobs, here, OPEN, MODEL.limits, arm=lambda job: f"no program {job.program}")
     assert (failing[-1].problem, len(failing)) == ("no program pick", 1)
-    assert time_needed(()) == 0.0
 
 
 def test_the_prediction_is_about_what_happens() -> None:
     rig = Rig()
     rig.begin()
     jobs = JobList((VoiceJob(1, "Good morning"), MoveJob(2, Goal(7.0, 1.0, 0.0)), MoveJob(3, Goal(2.0, 2.0))))
-    predicted = time_needed(dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits))
-    rig.operator.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
+    predicted = end(dry_run(jobs, Posture(*rig.truth), rig.roads, MODEL.limits))
+    rig.operator.robot.order(RobotTask(jobs=jobs), RobotTask(do=ListCommand.RUN))
     rig.run(1.0)
     began = rig.now - 1.0
-    while rig.operator.doing is not Doing.NOTHING:
+    while rig.operator.robot.doing is not Doing.NOTHING:
         rig.run(0.2)
         assert rig.now < began + 3 * predicted
-    assert rig.operator.tasks is not None
-    assert rig.operator.tasks.progress.stage is JobStage.DONE
+    assert rig.operator.robot.tasks is not None
+    assert rig.operator.robot.tasks.progress.stage is JobStage.DONE
     assert rig.now - began == pytest.approx(predicted, rel=0.15)
 
 

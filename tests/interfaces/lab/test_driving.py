@@ -17,8 +17,9 @@ from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import CAUSES, attributed, cases, grouped, measure, paired, sweep
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
-from robots.ipr.chassis import MobileReality
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import MobileReality
+from robots.mobile.robot import BareBody, place
 from robots.onboard.driving import STAND, Drive, Posture
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import advanced
@@ -32,7 +33,7 @@ def test_styles_keep_headroom_and_touch_nothing(style: str, seed: int) -> None:
     who = operator(style, seed, 0.1)
     # What a map doesn't have is for the extended architecture.
     room = place(who.room).known() if who.room else None
-    body = BareBody("ipr", who.start, room=room, reality=IDEAL, rng=0)
+    body = BareBody(IPR, who.start, room=room, reality=IDEAL, rng=0)
     posture, before, way = who.start, STAND, 0.0
     for k in range(1200):
         drive = who.drive(0.1 * k, posture, before)

@@ -29,9 +29,9 @@ from interfaces.lab.goals.study import (
 )
 from interfaces.lab.goals.trial import Trip, TripSetting
 from robots.bullet.rooms import Block, Room
-from robots.ipr.chassis import IPR
-from robots.ipr.navigation import route_map
-from robots.ipr.robot import Collision
+from robots.ipr.parameters import IPR
+from robots.mobile.navigation import route_map
+from robots.mobile.robot import Collision
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.routes import Route, RouteProblem
 from vrs.errors import InvalidValueError
@@ -59,7 +59,7 @@ def test_settings_repeat_and_are_what_their_group_says() -> None:
     assert sum(door.share(100.0) == 0.0 for door in closed.doors) == 3
     late = setting(LATE, 3, 1).room
     assert sum(door.share(0.0) < door.share(100.0) for door in late.doors) == 1
-    assert setting(PHYSICS, 3, 0).robot == "ipr"
+    assert setting(PHYSICS, 3, 0).body == "bullet"
 
 
 @pytest.mark.parametrize("group", [FURNITURE, PHYSICS])

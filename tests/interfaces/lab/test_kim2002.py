@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,13 +10,11 @@ import numpy as np
 import pytest
 
 from interfaces.lab import Study
-from interfaces.lab.claims import Claim, Figure
+from interfaces.lab.claims import Claim, Figure, Results
 from interfaces.lab.kim2002 import PAPER, scenario
 from interfaces.lab.kim2002.scenario import (
     ORDER,
     PLEASE,
-    ScenarioResult,
-    ScenarioStop,
     conclude,
     gap,
     play,
@@ -25,9 +22,9 @@ from interfaces.lab.kim2002.scenario import (
 from interfaces.lab.papers import papers
 from interfaces.messages.jobs import JobStage
 from robots.bullet.rooms import Person
-from robots.ipr.body import Cargo, MobileBody
-from robots.ipr.chassis import IPR
-from robots.ipr.robot import Collision, place
+from robots.ipr.parameters import IPR
+from robots.mobile.body import Cargo, MobileBody
+from robots.mobile.robot import Collision, place
 from vrs.errors import InvalidValueError
 
 
@@ -51,7 +48,7 @@ def test_the_scenario_is_played_to_its_end() -> None:
 
 @pytest.mark.parametrize(("friction", "stays"), [(0.5, True), (0.005, False)])
 def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bool) -> None:
-    with MobileBody("ipr", (0.0, 0.0, 0.0)) as body:
+    with MobileBody(IPR, (0.0, 0.0, 0.0)) as body:
         body.load(Cargo(friction=friction))
         for k in range(60):
             body.follow(0.5 if k % 20 < 10 else 0.0, 0.7 if k % 20 < 10 else -0.7)
@@ -62,20 +59,24 @@ def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bo
 
 
 def test_a_book_is_put_on_top_or_nowhere() -> None:
-    with MobileBody("ipr", (0.0, 0.0, 0.0)) as body, pytest.raises(InvalidValueError, match="top"):
+    with MobileBody(IPR, (0.0, 0.0, 0.0)) as body, pytest.raises(InvalidValueError, match="top"):
         body.load(Cargo(), (1.0, 0.0))
     with pytest.raises(InvalidValueError):
         Cargo(mass=0.0)
 
 
-GOOD = ScenarioResult(
-    stage=JobStage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(ScenarioStop(0.01, 0.01, 0.001),) * 2,
-    book=(0.1, 0.0, 0.8), slid=0.0, on_top=True, touched=(), passed=0.5, lost=0.01, time=60.0,
+def stop(off: float, turned: float, lost: float) -> Results:
+    return Results(off=off, turned=turned, lost=lost)
+
+
+GOOD = Results(
+    stage=JobStage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(stop(0.01, 0.01, 0.001),) * 2,
+    slid=0.0, on_top=True, touched=(), passed=0.5, lost=0.01, time=60.0,
     track=np.zeros((2, 3)),
 )  # fmt: skip
 
 
-def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[str, Claim]:
+def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Results) -> dict[str, Claim]:
     monkeypatch.setattr(scenario, "picture", lambda _: Figure("", "", ""))
     measured = tuple(tuple(runs[k :: scenario.TOGETHER]) for k in range(scenario.TOGETHER))
     return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), measured).claims}
@@ -90,24 +91,24 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: ScenarioResult) -> dict[st
         ({"on_top": False}, ["on top at A"]),
         ({"passed": 1.6}, ["passed near"]),
         ({"touched": (Collision(50.0, "passer-by"),)}, ["touches"]),
-        ({"stops": (ScenarioStop(0.051, 0.0, 0.0), ScenarioStop(0.0, 0.0, 0.0))}, ["position error at B"]),
+        ({"stops": (stop(0.051, 0.0, 0.0), stop(0.0, 0.0, 0.0))}, ["position error at B"]),
         (
-            {"stops": (ScenarioStop(0.0, 0.0, 0.0), ScenarioStop(0.051, 0.0, 0.0))},
+            {"stops": (stop(0.0, 0.0, 0.0), stop(0.051, 0.0, 0.0))},
             ["position error at A", "on top at A"],
         ),
         (
-            {"stops": (ScenarioStop(0.0, 0.0, 0.0), ScenarioStop(0.0, math.radians(2.1), 0.0))},
+            {"stops": (stop(0.0, 0.0, 0.0), stop(0.0, math.radians(2.1), 0.0))},
             ["heading error at A"],
         ),
-        ({"stops": (ScenarioStop(0.0, 0.0, 0.011), ScenarioStop(0.0, 0.0, 0.0))}, ["localization at B"]),
-        ({"stops": (ScenarioStop(0.0, 0.0, 0.0),)}, ["error at A", "localization at A", "on top at A"]),
+        ({"stops": (stop(0.0, 0.0, 0.011), stop(0.0, 0.0, 0.0))}, ["localization at B"]),
+        ({"stops": (stop(0.0, 0.0, 0.0),)}, ["error at A", "localization at A", "on top at A"]),
     ],
 )
 def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
     changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert all(claim.holds for claim in concluded(monkeypatch, *[GOOD] * 6).values())
-    found = concluded(monkeypatch, *[GOOD] * 5, replace(GOOD, **changes))
+    found = concluded(monkeypatch, *[GOOD] * 5, Results(**vars(GOOD) | changes))
     assert [any(word in text for word in said) for text in found] == [not claim.holds for claim in found.values()]
 
 

@@ -11,7 +11,8 @@ from interfaces.lab.claims import Results, Study
 from interfaces.lab.kim2006 import PAPER, links, packets
 from interfaces.lab.kim2006.following import Followed, FollowingCase, course, path_leader, run
 from interfaces.lab.kim2006.links import pair, verdict
-from interfaces.rsp.schemes import SCHEMES, ReportedPosition
+from interfaces.lab.kim2006.schemes import SCHEMES
+from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=0, runs=2, length=3.0)
@@ -73,7 +74,7 @@ def test_the_leader_has_no_error_of_its_own() -> None:
     x, y, theta = 0.0, 0.05, 0.3
     far = []
     for _ in range(900):
-        left, right = lead(ReportedPosition(x, y, theta))
+        left, right = lead(Posture(x, y, theta))
         v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / 0.15
         x, y, theta = x + 0.02 * v * math.cos(theta), y + 0.02 * v * math.sin(theta), theta + 0.02 * w
         far.append(float(np.linalg.norm(path - (x, y), axis=1).min()))

@@ -23,9 +23,9 @@ from interfaces.lab.localization.study import measure_axis
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from interfaces.runs.drive_run import DriveCase
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.apartments import ApartmentConfig, apartment
-from robots.ipr.chassis import MobileReality
-from robots.ipr.floor_plan import FloorPlan, plan_map
+from robots.mobile.apartments import ApartmentConfig, apartment
+from robots.mobile.chassis import MobileReality
+from robots.mobile.floor_plan import FloorPlan, plan_map
 from robots.onboard.driving import STAND, Drive
 from robots.onboard.global_localization import locate
 from robots.onboard.localization import PaperLocalizer

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Findings, Study
+from interfaces.lab.claims import Findings, Results, Study
 from interfaces.lab.localization import searching
 from interfaces.lab.localization.accuracy import (
     AS_BUILT,
@@ -19,17 +19,14 @@ from interfaces.lab.localization.accuracy import (
     METHODS,
     PLAN,
     SLOW,
-    RoomFound,
     conclude_rooms,
 )
 from interfaces.lab.localization.searching import (
-    Carried,
-    Twofold,
     conclude_carried,
     conclude_starts,
     conclude_symmetric,
 )
-from interfaces.lab.localization.study import Axis, conclude_axes
+from interfaces.lab.localization.study import conclude_axes
 from interfaces.lab.localization.trial import PostureErrors
 from robots.onboard.localizer import Status
 
@@ -49,10 +46,12 @@ def track(*, place: float = 1.0, turn: float = 1.0, doubt: float = 1.0, outlier:
 GOOD = track()
 
 
-def room(name: str = "", bad: PostureErrors = GOOD) -> RoomFound:
+def room(name: str = "", bad: PostureErrors = GOOD) -> Results:
     """A room in which everybody keeps the bars, but for one."""
     tracks = dict.fromkeys(METHODS, GOOD) | ({name: bad} if name else {})
-    return RoomFound(1, "room", 0, 0.01, 10.0, 0, (4, 4), tracks, None)
+    return Results(
+        name="room", people=0, noise=0.01, way=10.0, collisions=0, lines=(4, 4), tracks=tracks, scene=None
+    )
 
 
 def failed(conclude: Callable[..., Findings], found: Sequence[Any]) -> list[str]:
@@ -129,39 +128,43 @@ def test_an_answer_is_right_within_10_cm_and_3_deg(
     assert searching.answer_of(told, (1.0, 2.0, 0.0)) == answer
 
 
-TWOFOLD = Twofold("room", "ambiguous", 2, 2, 0.05)
+def twofold(status: Status = Status.AMBIGUOUS, named: int = 2, off: float = 0.05) -> Results:
+    return Results(room="room", status=status, named=named, expected=2, off=off)
+
+
+def carried(noticed: float, off: float) -> Results:
+    return Results(room="room", distance=2.0, noticed=noticed, recovered=6.0, off=off)
+
+
+def axis(place: str, *, named: float = 1.0, none: float = 0.0, along: float = 1.0) -> Results:
+    return Results(place=place, named=named, none=none, along=along, across=0.01, inside=0.95)
 
 
 @pytest.mark.parametrize("bad", [
-    Twofold("room", "tracking", 2, 2, 0.05), Twofold("room", "ambiguous", 1, 2, 0.05),
-    Twofold("room", "ambiguous", 4, 2, 0.05), Twofold("room", "ambiguous", 2, 2, 0.11),
-    Twofold("room", "ambiguous", 2, 2, math.nan),
+    twofold(Status.TRACKING), twofold(named=1), twofold(named=4), twofold(off=0.11), twofold(off=math.nan),
 ])  # fmt: skip
-def test_a_symmetric_room_that_is_taken_for_another_fails(bad: Twofold) -> None:
-    assert failed(conclude_symmetric, [TWOFOLD] * 3) == []
-    assert len(failed(conclude_symmetric, [TWOFOLD, bad])) == 1
+def test_a_symmetric_room_that_is_taken_for_another_fails(bad: Results) -> None:
+    assert failed(conclude_symmetric, [twofold()] * 3) == []
+    assert len(failed(conclude_symmetric, [twofold(), bad])) == 1
 
 
 @pytest.mark.parametrize(("noticed", "off", "said"), [
     (3.1, 0.01, "noticed"), (math.inf, 0.01, "noticed"), (1.0, 0.11, "found again"), (1.0, math.nan, "found again"),
 ])  # fmt: skip
 def test_a_robot_that_never_finds_itself_again_fails(noticed: float, off: float, said: str) -> None:
-    good = Carried("room", 2.0, 1.0, 6.0, 0.01)
+    good = carried(1.0, 0.01)
     assert failed(conclude_carried, [good] * 2) == []
-    (claim,) = failed(conclude_carried, [good, Carried("room", 2.0, noticed, 6.0, off)])
+    (claim,) = failed(conclude_carried, [good, carried(noticed, off)])
     assert said in claim
 
 
 @pytest.mark.parametrize(("bad", "said"), [
-    (Axis("corridor", 0.94, 0.0, 1.0, 0.01, 0.95), "named"),
-    (Axis("single wall", 1.0, 0.0, 0.09, 0.01, 0.95), "times"),
-    (Axis("room", 0.0, 0.94, 0.01, 0.01, 0.95), "nothing"),
+    (axis("corridor", named=0.94), "named"),
+    (axis("single wall", along=0.09), "times"),
+    (axis("room", named=0.0, none=0.94), "nothing"),
 ])  # fmt: skip
-def test_an_axis_that_is_not_named_fails(bad: Axis, said: str) -> None:
-    good = [
-        Axis("corridor", 1.0, 0.0, 1.0, 0.01, 0.95), Axis("single wall", 1.0, 0.0, 1.0, 0.01, 0.95),
-        Axis("room", 0.0, 1.0, 0.01, 0.01, 0.95),
-    ]  # fmt: skip
+def test_an_axis_that_is_not_named_fails(bad: Results, said: str) -> None:
+    good = [axis("corridor"), axis("single wall"), axis("room", named=0.0, none=1.0)]
     assert failed(conclude_axes, good) == []
     (claim,) = failed(conclude_axes, [bad])
     assert said in claim

@@ -298,8 +298,8 @@ def test_a_link_has_two_directions_that_draw_apart():
     assert there != back
     assert link.next_deadline() == min(there, back)
     link.forward.receive(there)
-    assert link.totals().forward.arrived == 1
-    assert link.totals().backward.arrived == 0
+    assert link.forward.log.totals().arrived == 1
+    assert link.backward.log.totals().arrived == 0
 
 
 def test_records_are_bounded_and_totals_know_of_all():

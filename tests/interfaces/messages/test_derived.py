@@ -182,7 +182,8 @@ def test_a_field_that_is_added_is_in_the_schema_of_recordings(newer: Any) -> Non
 
 def test_a_field_that_is_added_is_checked_in_the_page(newer: Any, browser: Any) -> None:
     source = generate.script(generate.messages())
-    assert "@property {number} [warmth] real from −50 to 150 (20). Of the motors" in source
+    check = 'm.warmth === undefined ? 20.0 : real(m.warmth, -50, 150, "state.warmth")'
+    assert f"m.warmth = {check}; // Of the motors" in source
     page = Script(browser.new_page(), source)
     frames = [encode(state_of(newer.State, **more), Encoding.JSON).decode() for more in ({}, {"warmth": 35.5})]
     assert [page.decode(frame)[0]["warmth"] for frame in frames] == [20, 35.5]

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
 from interfaces.recording.live import LiveRecorder, LiveRecording
-from interfaces.teleop import OperatorSite, RobotLine, RobotSite, RobotSiteConfig
+from interfaces.teleop import FollowingArm, OperatorSite, RobotLine, RobotSiteConfig, VirtualArm
 from robots import puma560
 from vrs.commands import Command
 
@@ -24,13 +24,11 @@ class Driven:
 
     def __init__(self, path: Path, delay: str = "none", loss: str = "0", *, seed: int = 0, beat: float = 1 / 30):
         way = LinkConditions.symmetric(Conditions(delay=delay_profile(delay), loss=loss_model(loss)))
-        self.operator = OperatorSite(MODEL, HOME, now=0.0)
+        self.operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
         self.line = RobotLine(self.operator, way, np.random.default_rng(seed))
         self.line.connected = True
-        self.robot = RobotSite(MODEL, HOME, now=0.0, config=RobotSiteConfig(beat=beat))
-        self.recorder = LiveRecorder(
-            LiveRecording(path, "adaptive", "hold"), self.line, MODEL, seed=seed, began=5e8
-        )
+        self.robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(beat=beat))
+        self.recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), self.line, seed=seed, began=5e8)
         self.recorder.open()
         self.now = 0.0
         self.cut = False
@@ -40,7 +38,7 @@ class Driven:
         self._ticks = 0
 
     def tell(self, command: Command) -> None:
-        self.operator.execute(command, now=self.now)
+        self.operator.robot.execute(command, now=self.now)
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK)):

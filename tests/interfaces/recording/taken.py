@@ -17,7 +17,7 @@ from interfaces.runs.twin_run import TwinRun, fixed_offset
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import run_twins
 from interfaces.system import software
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from robots import load
 from robots.robot import exact_arm
 from tests.vrs.sessions import Draws, Generator
@@ -62,8 +62,8 @@ class Sitting:
 
     def __init__(self, path: Path, seed: int) -> None:
         self.clock = 0.0
-        self.site = OperatorSite(MODEL, NOMINAL, now=0.0)
-        self.capture = Capture(self.site, MODEL, now=0.0, step=0.02, every=True)
+        self.site = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
+        self.capture = self.site.listener = Capture(self.site.robot.engine, now=0.0, step=0.02, every=True)
         begin = Begin(
             t=0.0, robot="puma560", driver="laboratory", title="sitting", seed=seed, delay="none",
             offset="adaptive", service="datagram", link_loss="hold", step=0.02, q=NOMINAL.tolist(),
@@ -71,7 +71,9 @@ class Sitting:
         )  # fmt: skip
         self.writer = RecordingWriter(path, begin)
         self.capture.put = self.writer.write
-        self.timelines = [self.site.engine.timeline]
+        for message in self.capture.first():
+            self.capture.add(0.0, message)
+        self.timelines = [self.site.robot.engine.timeline]
         """Every one that there was, one after the other."""
         self._source = Generator(seed)
         self._draws = Draws(self._source, MODEL)
@@ -83,15 +85,15 @@ class Sitting:
             self.tell()
             if self._source.share() < 0.04:
                 self.report(halted="chance" if self._source.share() < 0.3 else "")
-            self.clock += self._draws.pause(self.site.engine)
+            self.clock += self._draws.pause(self.site.robot.engine)
             if self.site.halted:
                 self.site.resume(now=self.clock)
-            self.capture.advance(now=self.clock)
+            self.capture.sample(now=self.clock)
             self.capture.write_out()
 
     def tell(self, command=..., /) -> None:
         """Tell it a command, one of any kind unless it's given."""
-        engine = self.site.engine
+        engine = self.site.robot.engine
         if command is ...:
             watch = SimpleNamespace(
                 engine=engine, moves={r.command_id: r for r in engine.receipts if r.q is not None},
@@ -100,9 +102,9 @@ class Sitting:
             command = self._draws.command(watch, self._draws.kind())  # type: ignore[arg-type]
         try:
             if command is None:
-                self.site.undo(now=self.clock)
+                self.site.robot.undo(now=self.clock)
             else:
-                self.site.execute(command, now=self.clock)
+                self.site.robot.execute(command, now=self.clock)
         except VrsError:
             return
         finally:
@@ -111,7 +113,7 @@ class Sitting:
     def report(self, halted: str = "") -> None:
         """Let the robot say that it's doing something else."""
         self._reports += 1
-        now, engine = self.clock, self.site.engine
+        now, engine = self.clock, self.site.robot.engine
         real = Engine(MODEL, timeline=engine.timeline, clock=ManualClock(now))
         away = np.clip(NOMINAL + 0.3 * np.sin(np.arange(6) + self._reports), MODEL.limits.q_min, MODEL.limits.q_max)
         real.execute(MotionCommand(JointTarget(away), execute_at=now + 0.05, speed=0.5))
@@ -127,13 +129,13 @@ class Sitting:
         self._note()
 
     def _note(self) -> None:
-        if self.site.engine.timeline is not self.timelines[-1]:
-            self.timelines.append(self.site.engine.timeline)
+        if self.site.robot.engine.timeline is not self.timelines[-1]:
+            self.timelines.append(self.site.robot.engine.timeline)
 
     def end(self) -> None:
         """Close the file."""
-        self.capture.advance(now=self.clock)
-        self.capture.receipts(self.clock, "virtual", self.site.engine.receipts)
+        self.capture.sample(now=self.clock)
+        self.capture.receipts(self.clock, "virtual", self.site.robot.engine.receipts)
         self.capture.whole(self.clock)
         self.capture.write_out()
         self.writer.finish(End(self.clock))

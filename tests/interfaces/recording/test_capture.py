@@ -22,7 +22,7 @@ from interfaces.runs.summary import summarize, to_json
 from interfaces.runs.twin_run import Turn
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import run_twins
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from robots.robot import exact_arm
 from tests.interfaces.recording import recorded, shown
@@ -56,27 +56,27 @@ class Heard:
 
 
 def test_a_site_tells_every_command_once_with_the_time_and_the_receipt():
-    site = OperatorSite(MODEL, NOMINAL, now=0.0)
+    site = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     heard = Heard(site)
     move = MotionCommand(JointTarget(NOMINAL + 0.1))
     far = MotionCommand(JointTarget(NOMINAL + 99.0))
     limits = ParameterChange("lateness", "reject")
-    taken_ = site.execute(move, now=0.125)
-    rejected = site.execute(far, now=0.25)
-    site.execute(limits, now=0.25)
-    undone = site.undo(now=0.3)
+    taken_ = site.robot.execute(move, now=0.125)
+    rejected = site.robot.execute(far, now=0.25)
+    site.robot.execute(limits, now=0.25)
+    undone = site.robot.undo(now=0.3)
     assert [(d.at, d.command, d.receipt, d.refused) for d in heard.deeds] == [
         (0.125, move, taken_, False), (0.25, far, rejected, False), (0.25, limits, None, False),
         (0.3, None, undone, False),
     ]  # fmt: skip
     assert rejected.status is Status.REJECTED
-    site.execute(PositionQuery(0.0), now=0.4)
+    site.robot.execute(PositionQuery(0.0), now=0.4)
     with pytest.raises(UnknownCommandError):
-        site.execute(Retime(77, 1.0), now=0.4)
+        site.robot.execute(Retime(77, 1.0), now=0.4)
     assert len(heard.deeds) == 4
     site.halted = Halt(HaltCause.REPORTED, "it stands in the way")
-    refused = site.execute(move, now=0.5)
-    assert site.undo(now=0.5) is None
+    refused = site.robot.execute(move, now=0.5)
+    assert site.robot.undo(now=0.5) is None
     assert [(d.at, d.command, d.receipt, d.refused) for d in heard.deeds[4:]] == [(0.5, move, refused, True)]
     assert "it stands in the way" in refused.reason
 
@@ -88,8 +88,8 @@ def test_a_site_tells_corrections_answers_and_reports(tmp_path):
     made.clock = 0.2
     made.report()
     ((correction, truth),) = heard.corrections
-    assert correction is made.site.corrections[0]
-    assert made.site.engine.timeline.sample(correction.end + 0.1) == pytest.approx(
+    assert correction is made.site.robot.corrections[0]
+    assert made.site.robot.engine.timeline.sample(correction.end + 0.1) == pytest.approx(
         truth.sample(correction.end + 0.1), abs=1e-9
     )
     assert [now for _, now in heard.reports] == [0.2]
@@ -128,7 +128,7 @@ def test_names_of_files_that_are_long_or_no_utf_8_can_be_read_back(tmp_path):
 
 
 def test_texts_of_any_length_can_be_read_back(tmp_path):
-    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
+    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     recorder.begin(recorded.begin(title="a", step=0.02, q=NOMINAL.tolist()), site)
     recorder.turn(
         Turn(
@@ -207,10 +207,10 @@ def test_a_disk_that_fills_up_leaves_what_it_took(tmp_path):
 
 @pytest.mark.usefixtures("small")
 def test_a_disk_that_fills_up_amid_commands_stops_no_command(tmp_path):
-    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(MODEL, NOMINAL, now=0.0)
+    recorder, site = RunRecorder(tmp_path / "run.mcap"), OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     recorder.begin(recorded.begin(title="many", step=0.02, q=NOMINAL.tolist()), site)
     for k in range(1100):
-        site.execute(MotionCommand(JointTarget(NOMINAL), execute_at=10.0 + 0.5 * k), now=0.001 * k)
+        site.robot.execute(MotionCommand(JointTarget(NOMINAL), execute_at=10.0 + 0.5 * k), now=0.001 * k)
     assert "takes no more after 30000 bytes" in recorder.problem
 
 
@@ -250,7 +250,7 @@ def test_an_edit_of_very_many_segments_is_written_as_the_whole_timeline(tmp_path
     with open_recording(tmp_path / "run.mcap") as recording:
         assert len([c for c in recording.changes if isinstance(c, HistoryEntry) and c.edit == 11]) > 1
         assert recording.edits[11].timeline == made.timelines[11]
-        assert recording.timeline == made.site.engine.timeline
+        assert recording.timeline == made.site.robot.engine.timeline
         again = rerun(recording)
         assert (again.identical, again.missing, again.versions) == (True, "", 12)
 
@@ -264,7 +264,7 @@ def test_many_commands_between_two_turns_are_all_written(tmp_path):
     with open_recording(tmp_path / "run.mcap") as recording:
         assert [entry.number for entry in recording.commands] == list(range(1, 1101))
         assert len(recording.edits) == 1101
-        assert recording.timeline == made.site.engine.timeline
+        assert recording.timeline == made.site.robot.engine.timeline
 
 
 def test_what_later_commands_made_of_receipts_is_in_a_cut_file_too(tmp_path):
@@ -272,13 +272,13 @@ def test_what_later_commands_made_of_receipts_is_in_a_cut_file_too(tmp_path):
     for k in range(70):
         made.clock = 0.01 * k
         made.tell(MotionCommand(JointTarget(NOMINAL + 0.05 * (k % 3)), execute_at=10.0 + 2.0 * k))
-        made.capture.advance(now=made.clock)
+        made.capture.sample(now=made.clock)
     made.tell(MotionCommand(JointTarget(NOMINAL), execute_at=140.0))
-    made.capture.advance(now=made.clock)
+    made.capture.sample(now=made.clock)
     made.capture.write_out()
     made.writer.flush()
     made.writer.abandon()
-    receipts = made.site.engine.receipts
+    receipts = made.site.robot.engine.receipts
     assert receipts[65].superseded_by == 71
     with open_recording(tmp_path / "run.mcap") as recording:
         told, known = (

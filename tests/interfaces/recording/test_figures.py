@@ -18,7 +18,7 @@ from interfaces.runs.summary import Attribution, OffsetOutcome, summarize, to_js
 from interfaces.runs.twin_run import commands_alone
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import run_twins
-from interfaces.teleop import OperatorSite
+from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from robots.robot import ExactArm, exact_arm
@@ -115,7 +115,7 @@ def test_what_other_runs_said_comes_back(tmp_path):
     recorder.finish(attributions, offsets)
     with open_recording(tmp_path / "run.mcap") as recording:
         found = figures(recording)
-        assert (found.attributions, found.offsets, found.missing) == (attributions, offsets, ())
+        assert (found.attributions, found.offsets, found.missing) == (attributions, offsets, [])
         assert to_json(summary(recording)) == to_json(summarize(run, attributions, offsets))
 
 
@@ -207,7 +207,7 @@ def test_a_file_without_samples_is_refused(tmp_path):
 
 def test_commands_alone_keep_the_ids_that_edits_name():
     away = [JointTarget(NOMINAL + 0.1 * k) for k in range(1, 4)]
-    site = OperatorSite(MODEL, NOMINAL, now=0.0)
+    site = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     told = [
         MotionCommand(JointTarget(NOMINAL + 99.0)), MotionCommand(away[0]), MotionCommand(away[1], execute_at=5.0),
         MotionCommand(JointTarget(NOMINAL - 99.0)), Retime(3, 7.0), MotionCommand(away[2], execute_at=20.0), None,
@@ -215,11 +215,11 @@ def test_commands_alone_keep_the_ids_that_edits_name():
     sent = []
     for k, command in enumerate(told):
         now = 0.1 * k
-        receipt = site.undo(now=now) if command is None else site.execute(command, now=now)
+        receipt = site.robot.undo(now=now) if command is None else site.robot.execute(command, now=now)
         if receipt.status is not Status.REJECTED:
             sent.append((now, command, receipt))
     assert len(sent) == 5
-    assert commands_alone(MODEL, NOMINAL, sent) == site.engine.timeline
+    assert commands_alone(MODEL, NOMINAL, sent) == site.robot.engine.timeline
 
 
 def test_differences_are_those_of_numbers_by_their_paths():

@@ -38,7 +38,7 @@ def own_figures(made: Driven, recording) -> dict[str, np.ndarray]:
     track = recording.track(REAL)
     rows = made.own(track.t[0], track.t[-1])
     t, play, q, asked = rows[:, 0], rows[:, 1], rows[:, 2:8], rows[:, 8:]
-    virtual = made.operator.engine.timeline
+    virtual = made.operator.robot.engine.timeline
     found = agreement(MODEL, virtual.sample(play), q)
     servo = agreement(MODEL, asked, q)
     p_virtual, p_real = (MODEL.forward(values)[:, :3, 3] for values in (virtual.sample(t), q))

@@ -28,9 +28,11 @@ from vrs.errors import InvalidValueError
 
 def begin_late(sitting, path, **given):
     """Record a sitting from now on."""
-    now, engine = sitting.clock, sitting.site.engine
-    sitting.site.clock.set(now)
-    sitting.capture = capture = Capture(sitting.site, MODEL, now=now, step=0.02, every=True, **given)
+    now, engine = sitting.clock, sitting.site.robot.engine
+    sitting.site.robot.clock.set(now)
+    sitting.capture = capture = sitting.site.listener = Capture(
+        sitting.site.robot.engine, now=now, step=0.02, every=True, **given
+    )
     begin = Begin(
         t=now, robot="puma560", driver="live", title="late", seed=0, delay="none", offset="adaptive",
         service="datagram", link_loss="hold", step=0.02, q=engine.joints(now).tolist(),
@@ -38,6 +40,8 @@ def begin_late(sitting, path, **given):
     )  # fmt: skip
     sitting.writer = RecordingWriter(path, begin)
     capture.put = sitting.writer.write
+    for message in capture.first():
+        capture.add(now, message)
     sitting.timelines = [engine.timeline]
 
 
@@ -60,7 +64,7 @@ def test_commands_run_again_from_the_middle(tmp_path, seed, most_before):
         assert again.difference == ""
         if not again.missing:
             assert again.commands > 10
-            assert again.timeline.end == made.site.engine.timeline.end
+            assert again.timeline.end == made.site.robot.engine.timeline.end
         assert len(recording.edits) == len(made.timelines)
         assert len(recording.edits[0].timeline) <= max(most_before, 30) + 30 or most_before > 30
         for edit, timeline in zip(recording.edits, made.timelines, strict=True):
@@ -74,19 +78,19 @@ def test_a_move_that_is_rough_stays_so(tmp_path):
     high = np.array([MODEL.limits.q_max[0], 0.0, -2.0, 0.0, 0.0, 0.0])
     made.tell(MotionCommand(JointTarget(low), execute_at=0.1))
     made.tell(MotionCommand(JointTarget(high), insertion=Insertion.APPEND))
-    t = made.site.engine.timeline.segments[-1].start - 1e-3
+    t = made.site.robot.engine.timeline.segments[-1].start - 1e-3
     made.tell(MotionCommand(JointTarget(low), execute_at=t, profile=Profile.JERK_LIMITED))
-    assert made.site.engine.receipts[-1].reason.startswith("braked with parabolas first")
+    assert made.site.robot.engine.receipts[-1].reason.startswith("braked with parabolas first")
     made.clock = t + 0.02
     made.end()
     begin_late(made, path)
     made.tell(Stop())
-    assert made.site.engine.receipts[-1].reason.startswith("each joint braked")
+    assert made.site.robot.engine.receipts[-1].reason.startswith("each joint braked")
     made.end()
     with open_recording(path) as recording:
         again = rerun(recording)
         assert (again.difference, again.missing) == ("", "")
-        assert again.receipts[-1].reason == made.site.engine.receipts[-1].reason
+        assert again.receipts[-1].reason == made.site.robot.engine.receipts[-1].reason
 
 
 def test_what_stays_behind_an_edit_is_counted_from_where_the_recording_begins(tmp_path):
@@ -171,21 +175,21 @@ def test_a_live_site_is_recorded_on_the_fly(tmp_path):
             await until(lambda: site.report is not None)
             await until(lambda: site.resume(now=clock.now()) == "")
             await until(lambda: site.report.epoch == site.epoch)
-            first = site.execute(MotionCommand(JointTarget(READY), speed=0.4), now=clock.now())
+            first = site.robot.execute(MotionCommand(JointTarget(READY), speed=0.4), now=clock.now())
             await until(lambda: clock.now() > first.execute_at + 0.2)
-            await live.begin_recording(what)
+            await live.recording.begin(what)
             with pytest.raises(InvalidValueError, match="once the other one has ended"):
-                await live.begin_recording(replace(what, path=tmp_path / "other.mcap"))
-            site.execute(MotionCommand(JointTarget(NOMINAL)), now=clock.now())
-            await until(lambda: clock.now() > site.engine.timeline.end + 0.3)
-            assert await live.end_recording() is None
-            assert await live.end_recording() is None
+                await live.recording.begin(replace(what, path=tmp_path / "other.mcap"))
+            site.robot.execute(MotionCommand(JointTarget(NOMINAL)), now=clock.now())
+            await until(lambda: clock.now() > site.robot.engine.timeline.end + 0.3)
+            assert await live.recording.end() is None
+            assert await live.recording.end() is None
             with pytest.raises(RecordingError, match="none is written over"):
-                await live.begin_recording(what)
+                await live.recording.begin(what)
             # Another one, which the end of the server closes.
-            await live.begin_recording(replace(what, path=tmp_path / "more.mcap"))
+            await live.recording.begin(replace(what, path=tmp_path / "more.mcap"))
             await asyncio.sleep(0.3)
-            return first, site.engine.timeline
+            return first, site.robot.engine.timeline
 
     first, timeline = asyncio.run(main())
     assert problems == []

@@ -29,7 +29,7 @@ from interfaces.runtime.live.operator import LiveOperator, LiveOperatorConfig
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
-from interfaces.teleop import OperatorSite, RobotLine
+from interfaces.teleop import OperatorSite, RobotLine, VirtualArm
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, ROBOT, child, robot_here, until
 from tests.interfaces.recording import shown
 from vrs import Insertion, JointTarget, MotionCommand, Status, SteerCommand
@@ -41,7 +41,7 @@ async def recorded(url, path, told):
     listening = sockets.bind("127.0.0.1", 0)
     link = LinkConditions.symmetric(Conditions(delay=delay_profile("constant:0.03")))
     recording = LiveRecording(path, "adaptive", "hold", told.append)
-    config = LiveOperatorConfig(ROBOT, NOMINAL, url, link, recording=recording)
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, recording=recording)
     operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], listening.getsockname()[1]))
     async with sockets.serve(app, listening), operator.running():
@@ -56,17 +56,17 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
 
     async def main():
         async with robot_here() as (_, url), recorded(url, path, told) as live:
-            site, clock = live.operator, live.clock
+            virtual, clock = live.operator.robot, live.clock
             heard = live.operator.listener.reported
             live.operator.listener.reported = lambda r, *, now: (reports.append(r), heard(r, now=now))
-            site.execute(MotionCommand(JointTarget(READY)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY)), now=clock.now())
             await asyncio.sleep(0.3)
-            site.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
-            site.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
+            virtual.execute(MotionCommand(JointTarget(READY + 9)), now=clock.now())
+            virtual.execute(SteerCommand(rates=np.full(6, 0.1)), now=clock.now())
             await asyncio.sleep(0.1)
-            site.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
-            site.undo(now=clock.now())
-            await until(lambda: set(site.receipts) >= {1, 3, 4})
+            virtual.execute(MotionCommand(JointTarget(NOMINAL), insertion=Insertion.APPEND), now=clock.now())
+            virtual.undo(now=clock.now())
+            await until(lambda: set(virtual.receipts) >= {1, 3, 4})
             live.emulation.impair(
                 Impair(1, 1, DirectionConditions("constant:0.03", "0", "in-order")), "Ada", now=clock.now()
             )
@@ -77,7 +77,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
             assert (health["file"], health["dropped"], health["problem"]) == (str(path), 0, None)
             # The block that's open, a turn of the recorder's thread and one of the site's, on a busy machine.
             assert health["written_s"] > clock.now() - 1.5
-            return site.engine.timeline, site.engine.receipts
+            return virtual.engine.timeline, virtual.engine.receipts
 
     timeline, receipts = asyncio.run(main())
     assert told == []
@@ -104,7 +104,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
         (rerouted,) = [event.text for event in recording.events if event.kind == "rerouted"]
         assert rerouted.startswith("Ada changed the way to the robot: delay constant:0.03, loss 0, in-order; back ")
         found, value = figures(recording), summary(recording)
-        assert found.missing == ()
+        assert found.missing == []
         assert value["errors"]["servo"]["tool_max_m"] < 1e-9
         assert value["commands"]["virtual"] == {"accepted": 3, "postponed": 0, "rejected": 1}
         assert value["messages"]["delay_mean_s"] == 0.03
@@ -133,7 +133,7 @@ def test_a_disk_that_fills_up_is_told_and_nothing_else_happens(tmp_path, monkeyp
     async def main():
         async with robot_here() as (_, url), recorded(url, tmp_path / "live.mcap", told) as live:
             await until(lambda: live.health()["recording"]["problem"])
-            receipt = live.operator.execute(MotionCommand(JointTarget(READY)), now=live.clock.now())
+            receipt = live.operator.robot.execute(MotionCommand(JointTarget(READY)), now=live.clock.now())
             await until(lambda: live.operator.report.q_at > receipt.execute_at + 0.2)
             await until(lambda: told)
 
@@ -155,7 +155,7 @@ def test_a_recording_that_breaks_is_told_and_nothing_else_happens(tmp_path, monk
 
             monkeypatch.setattr(live.operator.listener, "write_out", broken)
             await until(lambda: live.health()["recording"]["problem"])
-            receipt = live.operator.execute(MotionCommand(JointTarget(READY)), now=live.clock.now())
+            receipt = live.operator.robot.execute(MotionCommand(JointTarget(READY)), now=live.clock.now())
             await until(lambda: live.operator.report.q_at > receipt.execute_at + 0.2)
 
     asyncio.run(main())
@@ -168,8 +168,8 @@ def test_a_recording_that_breaks_is_told_and_nothing_else_happens(tmp_path, monk
 def alone(path, way=None):
     """A recorder of an operator's site whose robot is far away."""
     link = LinkConditions() if way is None else LinkConditions.symmetric(way)
-    line = RobotLine(OperatorSite(MODEL, NOMINAL, now=0.0), link, np.random.default_rng(0))
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8)
+    line = RobotLine(OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), link, np.random.default_rng(0))
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8)
     recorder.open()
     return recorder, line
 
@@ -178,7 +178,7 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
     recorder, line = alone(tmp_path / "live.mcap")
     heard, q = line.operator.listener, NOMINAL + 0.1
     goals = [MotionCommand(JointTarget(NOMINAL + 0.1 * k), insertion=Insertion.APPEND) for k in (1, 2, 3)]
-    receipts = [line.operator.execute(goal, now=0.1) for goal in goals]
+    receipts = [line.operator.robot.execute(goal, now=0.1) for goal in goals]
     recorder.advance(now=0.2, connected=True)
     said = ["never met", "never met", "", "", "no message", "no message", ""]
     for k, halted in enumerate(said):
@@ -212,14 +212,14 @@ def test_what_the_robot_tells_is_written_down_once(tmp_path):
 
 
 def test_what_was_before_a_late_recording_isnt_told_again(tmp_path):
-    line = RobotLine(OperatorSite(MODEL, NOMINAL, now=0.0), LinkConditions(), np.random.default_rng(0))
-    line.operator.execute(MotionCommand(JointTarget(READY)), now=0.0)
+    line = RobotLine(OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0)), LinkConditions(), np.random.default_rng(0))
+    line.operator.robot.execute(MotionCommand(JointTarget(READY)), now=0.0)
     line.advance(now=0.1)
     path = tmp_path / "live.mcap"
-    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, MODEL, seed=0, began=5e8, now=60.0)
+    recorder = LiveRecorder(LiveRecording(path, "adaptive", "hold"), line, seed=0, began=5e8, now=60.0)
     assert recorder.health()["written_s"] == 60.0
     recorder.open()
-    line.operator.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)
+    line.operator.robot.execute(MotionCommand(JointTarget(NOMINAL)), now=60.1)
     recorder.advance(now=60.2, connected=True)
     recorder.finish(now=60.3)
     assert recorder.health()["written_s"] == 60.3
@@ -237,7 +237,7 @@ def test_what_is_written_at_the_end_needs_no_room(tmp_path, monkeypatch):
     recorder, line = alone(tmp_path / "live.mcap", way)
     for k in range(20):
         goal = JointTarget(READY if k % 2 else NOMINAL)
-        line.operator.execute(MotionCommand(goal, insertion=Insertion.APPEND), now=0.1 * k)
+        line.operator.robot.execute(MotionCommand(goal, insertion=Insertion.APPEND), now=0.1 * k)
         recorder.advance(now=0.1 * k, connected=True)
         while recorder.recorder.queue:
             time.sleep(0.001)

@@ -55,13 +55,13 @@ def test_commands_of_every_kind_make_the_same_timeline_again(sittings, seed):
         assert (again.difference, again.missing) == ("", "")
         assert again.identical
         assert again.versions == len(made.timelines) - 1
-        assert same(again.timeline, made.site.engine.timeline)
+        assert same(again.timeline, made.site.robot.engine.timeline)
         # Whoever has no engine puts the edits together.
         assert len(recording.edits) == len(made.timelines)
         for edit, timeline in zip(recording.edits, made.timelines, strict=True):
             t = np.linspace(0.0, timeline.end + 1.0, 50)
             assert edit.timeline.sample(t) == pytest.approx(timeline.sample(t), abs=1e-12)
-        kept = facts(made.site.engine.receipts)
+        kept = facts(made.site.robot.engine.receipts)
         assert facts(again.receipts) == facts(recording.receipts("virtual")) == kept
 
 
@@ -95,7 +95,7 @@ def told(path):
     for k, command in enumerate(commands):
         made.clock = 0.1 + 0.1 * k
         made.tell(command)
-    made.clock = made.site.engine.timeline.end
+    made.clock = made.site.robot.engine.timeline.end
     made.tell(ParameterChange("qd_max", MODEL.limits.qd_max * 0.5))
     made.tell(MotionCommand(JointTarget(NOMINAL)))
     made.end()

@@ -9,7 +9,7 @@ from random import Random
 from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.model import RobotModel
 from interfaces.rsp.outbox import DeliveryOutcome, Settled
-from interfaces.rsp.outputs import Commanded, LinkLost, Occurred, Stored
+from interfaces.rsp.outputs import Commanded, Occurred, RobotChange, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.session import Keyring, PacketRoundTrip, Rank
 
@@ -128,7 +128,7 @@ class Judge:
                 self.stored.append(output.id)
             elif isinstance(output, Settled):
                 self._settled("memory event", output, self.events)
-            elif isinstance(output, LinkLost):
+            elif output is RobotChange.LINK_LOST:
                 self.lost += 1
         for output in pair.told:
             if isinstance(output, Settled):

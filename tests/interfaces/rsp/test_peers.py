@@ -176,7 +176,7 @@ def test_an_answer_to_another_question_is_dropped_and_counted(kind: PacketType) 
     if kind is PacketType.REFUSED:
         body = handshake.encode_refused(b"n" * 16, handshake.SessionRefusal.BUSY)
     else:
-        body = handshake.encode_answer(handshake.HandshakeAnswer(b"n" * 16, b"c" * 16))
+        body = handshake.encode_answer(b"n" * 16, b"c" * 16)
     head = Header(MODEL.id, False, kind, 0, 0, 5, 65_535, 0)
     pair.local.receive(handshake.sent(kind, body, head, None, Rank.OPERATOR), now=0.0)
     assert pair.local.state is LocalState.OPENING

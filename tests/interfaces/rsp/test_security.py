@@ -306,7 +306,7 @@ def challenged(robot: RobotCore, nonce: bytes, address: bytes, now: float) -> Op
     question = Open(Rank.OPERATOR, False, nonce)
     ((kind, _, _, body),) = asked(robot, question, address, now)
     assert kind is PacketType.CHALLENGE
-    return question._replace(cookie=handshake.decode_answer(body).given)
+    return question._replace(cookie=handshake.decode_answer(body)[1])
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from typing import Any
 
 from tests.interfaces.live_rig import Child
 
-SERVE = ("serve", "--body", "exact", "--link-loss", "hold")
+SERVE = ("serve", "--body", "ideal", "--link-loss", "hold")
 """A server for tests: quick, and its robot waits for a machine that is busy."""
 PATIENCE = 60.0
 

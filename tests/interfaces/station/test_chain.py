@@ -12,17 +12,22 @@ import pytest
 import interfaces.station
 from interfaces.station.chain import described, place, screws
 from robots import puma560
+from robots.robot import Gripper, Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
 MODEL = puma560.model()
-TOOL = np.array([0.01, -0.02, 0.056])
+TOOL = (0.01, -0.02, 0.056)
 MODULE = Path(interfaces.station.__file__).parent / "static" / "chain.js"
 
 
 def postures() -> Array:
     rng = np.random.default_rng(5)
     return rng.uniform(MODEL.limits.q_min, MODEL.limits.q_max, (40, 6))
+
+
+def robot(model: Any) -> Robot:
+    return Robot("arm", model, devices=(Gripper(TOOL),))
 
 
 def test_the_screws_place_every_link() -> None:
@@ -75,16 +80,15 @@ def test_the_page_places_them_alike(browser: Any) -> None:
     q = postures()
     found = page.evaluate(
         "([robot, all]) => { const c = new Chain(robot); return all.map((q) => [c.links(q), c.toolAt(q)]); }",
-        [described(MODEL, TOOL), q.tolist()],
+        [described(robot(MODEL)), q.tolist()],
     )
     page.close()
     for joints, (links, tool) in zip(q, found, strict=True):
         expected = np.asarray(MODEL.links(joints))
         drawn = np.array(links).reshape(-1, 4, 4).transpose(0, 2, 1)
         np.testing.assert_allclose(drawn, expected, atol=1e-12)
-        np.testing.assert_allclose(tool, expected[-1, :3, :3] @ TOOL + expected[-1, :3, 3], atol=1e-12)
+        np.testing.assert_allclose(tool, expected[-1, :3, :3] @ np.array(TOOL) + expected[-1, :3, 3], atol=1e-12)
 
 
 def test_speeds_are_the_models() -> None:
-    slow = replace(MODEL, tool_speed=0.2)
-    assert described(slow, TOOL)["tool_speed"] == 0.2
+    assert described(robot(replace(MODEL, tool_speed=0.2)))["tool_speed"] == 0.2

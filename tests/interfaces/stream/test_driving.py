@@ -8,19 +8,19 @@ from typing import Any
 import pytest
 
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
-from interfaces.messages.control import Problem
+from interfaces.messages.control import Problem, Welcome
 from interfaces.messages.drive_sites import RobotTask
-from interfaces.messages.mobile import Postures, Seen, Tasks
+from interfaces.messages.mobile import MobileWelcome, Postures, Seen, Tasks
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
 from interfaces.stream.driving import DriveServlet, DriveSite
-from interfaces.stream.hub import Hub, HubConfig
-from interfaces.stream.session import HubSession
+from interfaces.stream.hub import Hub, HubConfig, HubSession
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
 from robots.onboard.lease import Ended, Grant, Lease
-from tests.interfaces.teleop.driving.rig import MODEL, Rig
+from tests.interfaces.stream.served import make_hub
+from tests.interfaces.teleop.rig import MODEL, Rig
 from vrs import DriveCommand, Stop
 from vrs.commands import PositionQuery
 
@@ -55,7 +55,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     now = rig.now
     assert ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), now).refusal == ""
     rig.run(0.2)
-    assert rig.operator.site.before.v > 0
+    assert rig.operator.robot.architecture.before.v > 0
     assert "leave out execute_at" in ordered(servlet, 2, DriveCommand(0.3, 0.0, 0.3, execute_at=5.0), now).refusal
     assert "drive and stop" in ordered(servlet, 3, PositionQuery(), now).refusal
     assert ordered(servlet, 4, None, now).refusal
@@ -65,7 +65,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     assert "stopped" in refused.refusal
     assert refused.code is RefusalCode.NOT_FOLLOWING
     rig.run(1.0)
-    assert rig.operator.stands
+    assert rig.operator.robot.stands
 
 
 def test_who_isnt_admitted_drives_nothing() -> None:
@@ -73,7 +73,7 @@ def test_who_isnt_admitted_drives_nothing() -> None:
     servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: Refusal("no lease: acquire it first"))
     assert "no lease" in ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), rig.now).refusal
     rig.run(0.5)
-    assert rig.operator.stands
+    assert rig.operator.robot.stands
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def said(session: HubSession, *messages: dict[str, Any], now: float = 5.0) -> li
     """What a client hears that says something."""
     for message in messages:
         session.receive(json.dumps(message), now=now)
-    session.desk.advance(now=now)  # type: ignore[attr-defined]
+    session.hub.advance(now=now)
     return [json.loads(data) for data in session.advance(now=now)]
 
 
@@ -113,16 +113,40 @@ def test_a_client_is_told_what_it_may_ask_for_and_where_both_robots_are(hub: Hub
     assert "refusal" not in said(session, order, now=5.5)[0]
 
 
-def test_a_client_for_arms_is_told_that_there_is_none(hub: Hub) -> None:
-    core, session = ClientCore(), hub.open(Encoding.MSGPACK, now=5.0)
+def greeted(core: ClientCore, hub: Hub) -> HubSession:
+    """Let a client say hello to a hub, and hear what that says."""
+    session = hub.open(Encoding.MSGPACK, now=5.0)
     core.connected(now=0.0)
     for data in core.advance(now=0.0):
         session.receive(data, now=5.0)
     for data in session.advance(now=5.0):
         core.receive(data, now=0.0)
-    assert core.phase is Phase.CLOSED
-    assert isinstance(core.problem, Problem)
-    assert "mobile robot ipr" in core.problem.text
+    return session
+
+
+def test_a_client_for_the_other_kind_of_robot_is_told_that_there_is_none(hub: Hub) -> None:
+    said = "mobile robot ipr is driven here, not an arm", "arm puma560 is served here, not a mobile robot"
+    for expects, met, text in ((Welcome, hub, said[0]), (MobileWelcome, make_hub(), said[1])):
+        core = ClientCore(expects=expects)
+        greeted(core, met)
+        assert core.phase is Phase.CLOSED
+        assert isinstance(core.problem, Problem)
+        assert text in core.problem.text
+
+
+def test_a_client_keeps_the_newest_of_each_kind(hub: Hub) -> None:
+    core = ClientCore(expects=MobileWelcome)
+    session = greeted(core, hub)
+    assert core.newest == {}
+    here = Posture(1.0, 2.0, 0.5)
+    for number in (1, 2):
+        hub.show(Postures(number, 5.0, here, Drive(0.0, 0.0), here))
+        hub.tell(Tasks(reason=f"after {number}"))
+        session.hub.advance(now=5.0 + number)
+        for data in session.advance(now=5.0 + number):
+            core.receive(data, now=float(number))
+    assert core.newest[Postures].number == 2
+    assert core.newest[Tasks].reason == "after 2"
 
 
 class Workers:

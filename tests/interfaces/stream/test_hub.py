@@ -37,9 +37,9 @@ def test_it_expires_without_beats_and_stops_the_robot():
     hub = make_hub(stops=False)
     peer, epoch = holder(hub)
     assert peer.tell(control.Beat(epoch), now=1.5) == []
-    version = hub.lease_version
+    version = hub.leasing.version
     hub.stopped(now=3.0)
-    assert hub.lease_version == version, "no lease has ended"
+    assert hub.leasing.version == version, "no lease has ended"
     hub.advance(now=3.49)
     assert hub.robot.log == [("began", epoch)]
     assert hub.next_deadline() <= 3.51

@@ -15,8 +15,8 @@ from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.objects import SCREEN_INK
 from robots import load
-from robots.ipr.robot import place
 from robots.ipr.shapes import SCREEN_SIZE, screen_pose
+from robots.mobile.robot import place
 from vrs import DriveCommand, Engine
 from vrs.errors import InvalidValueError
 from vrs.mobile import Grid

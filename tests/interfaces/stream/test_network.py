@@ -19,7 +19,7 @@ from interfaces.messages.control import (
 )
 from interfaces.recording.marks import OF_EVENTS, MarkKind
 from interfaces.runtime.live.emulation import LiveEmulation, late_often
-from interfaces.teleop import OperatorSite, RobotLine
+from interfaces.teleop import OperatorSite, RobotLine, VirtualArm
 from tests.interfaces.stream.served import HOME, MODEL, make_hub
 from tests.interfaces.stream.test_session import Peer, holder
 
@@ -37,7 +37,9 @@ class Robot:
 
 def emulated(**options):
     """A hub with a way to a robot, and what was told of its changes."""
-    line = RobotLine(OperatorSite(MODEL, HOME, now=0.0), LinkConditions.symmetric(BEGUN), np.random.default_rng(3))
+    line = RobotLine(
+        OperatorSite(VirtualArm(MODEL, HOME, now=0.0)), LinkConditions.symmetric(BEGUN), np.random.default_rng(3)
+    )
     told: list[tuple[float, str]] = []
     emulation = LiveEmulation(line, Robot(**options), 3, lambda now, text: told.append((now, text)))  # type: ignore[arg-type]
     return make_hub(emulation=emulation), line, told

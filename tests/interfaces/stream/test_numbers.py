@@ -95,7 +95,7 @@ def state(hub: Any, peer: Peer) -> tuple[Any, ...]:
     engine, seat = hub.site.engine, peer.session.seat
     orders = None if seat is None else len(seat.servlet.orders.outcomes)
     parameters = {name: np.array(value).tolist() for name, value in engine.parameters.items()}
-    lease = hub.lease_state, hub.lease_version, tuple(hub.robot.log)
+    lease = hub.lease_state, hub.leasing.version, tuple(hub.robot.log)
     return engine.timeline.version, engine.receipts, hub.site.journal.number, parameters, lease, orders, hub.seats
 
 

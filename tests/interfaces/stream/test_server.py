@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from interfaces.messages import Follow, ViewForm, control
 from interfaces.messages.control import Ping, Role
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
-from interfaces.stream.session import HubSession
+from interfaces.stream.hub import HubSession
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.test_session import COMING
 

@@ -71,8 +71,9 @@ def closed(peer, code, problem, *, now):
 
 def test_hello_must_come_in_time():
     peer = Peer(make_hub(), greet=False)
-    assert peer.session.next_deadline() == 2.0
+    assert not peer.session.is_due(1.999)
     assert peer.got(now=1.999) == []
+    assert peer.session.is_due(2.0)
     closed(peer, 1008, ProblemCode.HELLO_LATE, now=2.0)
 
 
@@ -280,7 +281,7 @@ def test_a_slow_reader_gets_the_newest_frame_and_no_more_waits_than_it_may():
     peer.tell(Follow(1, ViewForm.FRAMES, 60.0), now=0.0)
     for k in range(1, 600):
         hub.advance(now=k / 60)
-    assert peer.session.waiting == 0
+    assert peer.session.outbox.waiting == 0
     found = [message for message in peer.got(now=10.0) if message.kind == "broadcast"]
     assert len(found) == 1
     assert found[0].frame.made_at == pytest.approx(10.0, abs=0.02)
@@ -309,7 +310,7 @@ def test_a_slow_reader_of_compact_frames_goes_on_from_a_key_frame(delay, asks):
         if asks:
             # Each message of the client lets the session look for what it has for it.
             peer.session.receive(encode(Ask(k), Encoding.MSGPACK), now=k / 60)
-        assert peer.session.waiting <= 1024
+        assert peer.session.outbox.waiting <= 1024
     for k in range(600, 640):
         hub.advance(now=k / 60)
         read(k / 60)
@@ -330,9 +331,9 @@ def test_one_who_asks_and_never_reads_costs_little():
     for k in range(2, 700):
         for message in (Ask(k, 0.01 * k), Want(300, 0), Want(0, None), Order(1, to(1), epoch)):
             peer.session.receive(encode(message, Encoding.MSGPACK), now=4.0 + 0.0001 * k)
-        worst = max(worst, peer.session.waiting)
+        worst = max(worst, peer.session.outbox.waiting)
     assert worst <= hub.limits.waiting
-    assert peer.session.dropped > 0
+    assert peer.session.outbox.dropped > 0
     assert peer.session.closing is None
     found = peer.got(now=5.0)
     assert kinds(peer.tell(Ask(10_000, 0.5), now=5.0))[-1:] == ["answer"], "it's served again when it reads"

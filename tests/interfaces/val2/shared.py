@@ -2,124 +2,80 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 from interfaces.clients.designer import Designer
-from interfaces.clients.viewer import Viewer
 from interfaces.messages import control
-from interfaces.messages.control import Role
-from interfaces.stream.client import Phase
+from interfaces.messages.control import State
+from interfaces.stream.local import LocalClient
 from interfaces.val2.controller import Controller
-from interfaces.val2.monitor.control import LeaseControl, SharedController
+from interfaces.val2.monitor.control import ServedControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.motion import Arm
-from interfaces.val2.motion.remote import RemoteRobot
+from interfaces.val2.motion import Arm, EngineRobot
 from tests.interfaces.stream.joined import STEP, Joined
 from tests.interfaces.stream.served import MODEL
 
+FOLLOWS = State(
+    number=1, t=0.0, q=MODEL.poses["nominal"], play=0.0, pace=1.0, D=0.0, following_error=0.0, connected=True,
+    halted="",
+)  # fmt: skip
 
-class Line:
-    """A connection as `connect` makes it, in virtual time."""
+
+class Page:
+    """A page's connection, in virtual time."""
 
     def __init__(self, joined: Joined) -> None:
         self.joined, self.core = joined, joined.client()
         self._designer = Designer(self.core.port)
         joined.parts[self.core].append(self._designer)
-        self.designer = self
-        self.state = SimpleNamespace(q=MODEL.poses["nominal"], connected=True, halted="")
-        self.history = ()
         joined.run(0.5)
 
     @property
-    def now(self):
-        return self.joined.time(self.core)
-
-    @property
-    def lease(self):
-        return self.core.lease
-
-    @property
-    def lapses(self):
-        return self.core.lapses
-
-    @property
-    def is_connected(self):
-        return self.core.phase is Phase.OPEN
+    def holds(self):
+        return self.core.epoch > 0
 
     def issue(self, command):
-        return self._designer.issue(command, now=self.now)
+        return self._designer.issue(command, now=self.joined.time(self.core))
 
     def undo(self):
-        return self._designer.undo(now=self.now)
+        return self._designer.undo(now=self.joined.time(self.core))
 
     def issued(self, number):
         return self._designer.issued(number)
 
-    def wish(self, make, **how):
-        return self.core.wish(make, now=self.joined.now + self.joined.ahead[self.core], **how)
-
-    def acquire(self, *, wait):
-        self.wish(control.Acquire)
-
-    def release(self, *, wait):
-        self.wish(lambda number: control.Release(number, self.core.epoch), leased=True)
-
-    def ask_to_share(self, session):
-        return self.wish(lambda number: control.Share(number, session))
-
-    def answer(self, number):
-        return self.core.answer(number)
-
-    def viewer(self, *, rate):
-        peer = self.joined.client(role=Role.VIEWER)
-        self.joined.run(0.2)
-        viewer = Viewer(peer.port, rate=rate)
-        self.joined.parts[peer].append(viewer)
-        self.joined.run(0.3)
-        return _Following(viewer)
+    def release(self):
+        now = self.joined.now + self.joined.ahead[self.core]
+        self.core.wish(lambda number: control.Release(number, self.core.epoch), now=now, leased=True)
 
 
-class _Following:
-    """A viewer whose server answers at once."""
+class Clock:
+    """Session time of what is joined."""
 
-    def __init__(self, viewer) -> None:
-        self._of = viewer
+    def __init__(self, joined: Joined) -> None:
+        self._joined = joined
 
-    @property
-    def timeline(self):
-        return self._of.timeline
-
-    def wait(self, ready, timeout):
-        return ready(self)
+    def now(self) -> float:
+        return self._joined.now
 
 
 class Pair:
-    """A page that has the lease, and its terminal."""
+    """A page, and its terminal in the server's process."""
 
     def __init__(self, directory) -> None:
         self.joined = Joined()
-        self.page = Line(self.joined)
-        self.val = Line(self.joined)
-        arm = Arm(RemoteRobot(self.val, MODEL))
-        self.controller = Controller(arm, parameters=arm.parameters, now=self.val.now)
-        self.shared = SharedController(self.controller, LeaseControl(self.val))
-        self.taken = 0
-        self.monitor = TerminalMonitor(self.shared, Files(directory), "a test", person=self)
-        self.monitor.start(now=self.val.now)
+        self.joined.hub.show(FOLLOWS)
+        self.page = Page(self.joined)
+        self.val = LocalClient(self.joined.hub, Clock(self.joined), "VAL-II terminals", lambda: None)
+        arm = Arm(EngineRobot(self.engine, lambda command, _now: self.val.execute(command)))
+        self.controller = Controller(arm, parameters=arm.parameters, now=self.joined.now)
+        self.shared = SharedController(self.controller, ServedControl(self.val))
+        session = self.page.core.welcome.session
+        self.monitor = TerminalMonitor(self.shared, Files(directory), "a test", session=session)
+        self.monitor.start(now=self.joined.now)
         self.said = ""
 
     @property
-    def session(self):
-        return self.page.core.welcome.session
-
-    @property
     def holds(self):
-        return self.page.core.epoch > 0
-
-    def take(self):
-        self.taken += 1
-        self.page.acquire(wait=0.0)
+        return self.page.holds
 
     @property
     def engine(self):
@@ -131,14 +87,14 @@ class Pair:
         while self.joined.now < end - 1e-9:
             self.joined.turn()
             self.joined.now += STEP
-            self.monitor.advance(now=self.val.now)
+            self.monitor.advance(now=self.joined.now)
             self.said += "".join(piece.text for piece in self.monitor.output())
 
     def type(self, *lines):
         """Type lines, each when there's a prompt; what was said."""
         self.said = ""
         for line in lines:
-            self.monitor.line(line, now=self.val.now)
+            self.monitor.line(line, now=self.joined.now)
             self.run(0.05)
             for _ in range(1000):
                 if self.monitor.prompt:

@@ -111,10 +111,10 @@ def test_a_line_is_coloured_and_stays_the_same(sitting):
         assert "".join(piece for _, piece, *_ in lexer.pieces(text)) == text
     classes = [kind for kind, *_ in lexer.pieces('do type "a", 3')]
     assert classes[0] == "class:command"
-    assert {"class:string", "class:number"} <= set(classes)
+    assert {"class:pygments.literal.string.double", "class:pygments.literal.number"} <= set(classes)
     assert style()
     sitting.type("EDIT p")
-    assert lexer.pieces("MOVE p")[0][0] == "class:keyword"
+    assert lexer.pieces("MOVE p")[0][0] == "class:pygments.keyword"
     sitting.type("Q", "HERE p")
     assert lexer.pieces("1,2") == [("", "1,2")]
 

@@ -20,7 +20,6 @@ def test_a_hand_that_relaxes_with_a_motion_lets_go_where_it_is() -> None:
     told: list[tuple[float, bool]] = []
     hand = Hand({}, lambda t, holds: told.append((t, holds)))
     hand.actuate(False, 0.0)
-    hand.wanted, hand.relax = None, True
     hand.ask(1, None)
     assert hand.waits
     hand.begin(lambda _: 5.0, 4.0)

@@ -320,3 +320,27 @@ def test_no_line_ends_the_monitor(sitting):
                 sitting.monitor.interrupt(now=sitting.now)
     assert sitting.monitor.prompt in {".", "*", ""}
     assert not sitting.monitor.done
+
+
+def test_kill_gives_up_a_program_that_stands(sitting):
+    sitting.type(*LOOP, "EXECUTE loop")
+    assert sitting.type("KILL").startswith("*Program running*")
+    sitting.type("ABORT")
+    assert sitting.type("KILL") == "loop has ended (KILL)\n"
+    for line in ("KILL", "PROCEED", "RETRY"):
+        assert sitting.type(line) == "*No program to proceed*\n"
+    assert "idle" in sitting.type("STATUS")
+    assert "*Invalid argument*" in sitting.type("KILL loop")
+    sitting.type(*HELLO, "EXECUTE hello")
+    assert sitting.finish() == "hello\nhello has ended (END)\n"
+
+
+@pytest.mark.parametrize("cycles", [5, -1])
+def test_done_ends_a_program_with_its_present_cycle(sitting, cycles):
+    sitting.type("EDIT turn", "DELAY 1", "BREAK", 'TYPE "turn"', "E")
+    sitting.line(f"EXECUTE turn,{cycles}")
+    sitting.pass_time(1.5)
+    sitting.line("DONE")
+    assert sitting.finish() == "turn\nturn has ended (END)\n"
+    assert sitting.type("DONE") == "*No program running*\n"
+    assert sitting.type("DONE 3").startswith("*Invalid argument*")

@@ -29,10 +29,13 @@ class Held:
         why, self.why = self.why, ""
         return why
 
-    def request(self, person=None, *, now):
+    def regain(self):
+        pass
+
+    def request(self, session=None, *, now):
         return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
 
-    def release(self, *, now):
+    def release(self):
         self.released += 1
 
     def resume(self, *, now):

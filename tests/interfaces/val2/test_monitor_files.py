@@ -180,3 +180,24 @@ def test_a_file_with_unknown_instructions_is_loaded_and_all_of_them_are_named(si
     said = sitting.type("EXECUTE odd")
     assert "*Undefined instruction* MVOE; did you mean MOVE?, program odd, step 5" in said
     assert "FROBNICATE" not in said
+
+
+def test_files_are_deleted_and_renamed_and_asked_for_first(sitting, tmp_path):
+    sitting.type(*HELLO, "STORE a", "STORE b")
+    sitting.line("FDELETE a")
+    assert sitting.monitor.prompt == "Delete a.v2 (Y/N)? "
+    sitting.type("N", "FRENAME c=a")
+    assert sorted(path.name for path in tmp_path.glob("*.v2")) == ["b.v2", "c.v2"]
+    sitting.line("FRENAME b=c")
+    assert sitting.monitor.prompt == "b.v2 exists. Replace it (Y/N)? "
+    sitting.type("", "FDELETE c", "Y", "FRENAME d=b")
+    assert [path.name for path in tmp_path.glob("*.v2")] == ["d.v2"]
+    assert sitting.monitor.suggestions("FRENAME e=")[1][0].word == "d"
+    assert sitting.monitor.suggestions("FDELETE ")[1][0].word == "d"
+    for line, wrong in (
+        ("FDELETE", "*Missing argument* a file's name"), ("FDELETE e", "*Nonexistent file* e.v2"),
+        ("FDELETE ../d", "*Invalid file name* ../d"), ("FRENAME e", "*Missing argument* FRENAME new=old"),
+        ("FRENAME e=f", "*Nonexistent file* f.v2"), ("FRENAME ../e=d", "*Invalid file name* ../e"),
+    ):  # fmt: skip
+        assert sitting.type(line).startswith(wrong), line
+    assert "Rename a file" in sitting.type("HELP FRENAME")

@@ -20,10 +20,10 @@ class Seen:
         self.sitting.monitor.leave(now=0.0)
         self.terminal = PageTerminal()
         self.text, self.prompt, self.size, self.others = "", None, 0, []
-        self.tell(type="hello", token=None, session="page's", holds=True)
+        self.tell(type="hello", token=None, session="page's")
         files = Files(directory, examples=examples)
         self.monitor = TerminalMonitor(
-            self.sitting.shared, files, "a test", read_only=read_only, person=self.terminal
+            self.sitting.shared, files, "a test", read_only=read_only, session=self.terminal.session
         )
         self.terminal.begin(self.monitor, now=0.0)
         self.look()
@@ -103,16 +103,16 @@ def test_a_page_that_shows_nothing_is_sent_little_and_loses_what_finds_no_room(t
         '{"type":"nothing"}', '{"type":"shown","size":-1}', '{"type":"shown","size":1e400}', b"\xff\xfe",
         "[" * 9000,
         '{"type":"lines","lines":["' + "x" * 20_000 + '"]}',
-        '{"type":"who","session":"' + "x" * 300 + '","holds":true}',
+        '{"type":"who","session":"' + "x" * 300 + '"}',
     ],
     ids=range(14),
 )  # fmt: skip
 def test_what_is_no_message_ends_the_connection_and_does_nothing(tmp_path, data):
     seen = Seen(tmp_path)
-    before = seen.terminal.session, seen.terminal.holds
+    before = seen.terminal.session
     seen.terminal.receive(data, now=0.0)
     assert seen.terminal.closing is not None
-    assert (seen.terminal.session, seen.terminal.holds) == before
+    assert seen.terminal.session == before
 
 
 def test_who_only_looks_is_told_so(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from interfaces import Designer, Viewer, connect
 from interfaces.messages.control import Lease
-from interfaces.teleop import OperatorSite, RobotSiteConfig
+from interfaces.teleop import OperatorSite, RobotSiteConfig, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, arm_for
@@ -224,9 +224,8 @@ def test_a_motion_that_is_never_seen_ends_as_an_error_a_while_after_its_end(line
 
 
 def test_a_robot_that_has_halted_says_how_it_goes_on():
-    site = OperatorSite(
-        MODEL, MODEL.poses["nominal"], now=0.0, halted=Halt(HaltCause.REPORTED, "nothing fresh came")
-    )
+    virtual = VirtualArm(MODEL, MODEL.poses["nominal"], now=0.0)
+    site = OperatorSite(virtual, halted=Halt(HaltCause.REPORTED, "nothing fresh came"))
     with pytest.raises(ValError, match=r"\*Robot halted\* nothing fresh came; ENABLE POWER lets it go on"):
         Arm(SiteRobot(site)).go_ready(now=0.0)
 

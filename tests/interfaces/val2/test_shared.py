@@ -27,10 +27,10 @@ def stands(pair, seconds=1.0):
 def test_a_command_takes_control_for_the_page_and_gives_it_back_to_nobody(tmp_path):
     pair = Pair(tmp_path)
     pair.type("WHERE")
-    assert (pair.taken, pair.holds) == (0, False)
+    assert not pair.holds
     assert "*" not in pair.type("DO DRIVE 1,10,50")
-    assert (pair.taken, pair.holds, pair.val.lease.shared) == (1, True, True)
-    pair.monitor.leave(now=pair.val.now)
+    assert (pair.holds, pair.val.lease.shared) == (True, True)
+    pair.monitor.leave(now=pair.joined.now)
     pair.run(0.2)
     assert pair.holds
     assert not pair.val.lease.commands
@@ -85,7 +85,7 @@ def test_a_lease_that_ends_ends_the_program(tmp_path):
     pair = Pair(tmp_path)
     pair.type(*LOOP, "EXECUTE loop, -1")
     pair.run(1.3)
-    pair.page.release(wait=0.0)
+    pair.page.release()
     pair.run(0.1)
     assert not pair.controller.running
     assert "*Motion interrupted* control has ended" in pair.said

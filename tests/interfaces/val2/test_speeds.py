@@ -53,7 +53,7 @@ def test_what_is_not_said_of_turning_follows_percents_alone() -> None:
     ):
         settings.set_speed(*asked, always=False)
         assert settings.next.speed == speed
-    settings.taken()
+    settings.next = settings.always
     assert settings.next.speed == Speed()
     with pytest.raises(ValError, match="above 0"):
         settings.set_speed(20.0, 0.0, "%", always=True)

@@ -11,7 +11,7 @@ from interfaces.messages.drive_sites import Doing, RobotTask
 from interfaces.messages.jobs import ArmJob, JobList, JobStage, ListCommand, WaitJob
 from interfaces.val2.val_arm import ValArm, in_a_thread, lasts
 from robots import puma560
-from tests.interfaces.teleop.driving.rig import Rig
+from tests.interfaces.teleop.rig import Rig
 
 WAVE = """.PROGRAM other()
     TYPE "not this one"
@@ -89,18 +89,18 @@ def test_what_cant_be_carried_out_says_why(program: str, source: str, says: str)
 def test_it_is_a_job_among_others_and_can_be_aborted() -> None:
     rig = Rig(arm=ValArm())
     rig.begin()
-    rig.operator.order(
+    rig.operator.robot.order(
         RobotTask(jobs=JobList((ArmJob(1, "wave", WAVE), WaitJob(2, 0.5)))), RobotTask(do=ListCommand.RUN)
     )
     rig.run(1.0)
-    assert rig.operator.doing is Doing.JOBS
-    rig.operator.order(RobotTask(do=ListCommand.ABORT))
+    assert rig.operator.robot.doing is Doing.JOBS
+    rig.operator.robot.order(RobotTask(do=ListCommand.ABORT))
     rig.run(1.0)
     held = rig.hands.arm.joints(0.0)  # type: ignore[attr-defined]
     assert held is not None
     assert rig.operator.resume(now=rig.now) == ""
     rig.run(0.5)
-    rig.operator.order(RobotTask(do=ListCommand.RUN))
+    rig.operator.robot.order(RobotTask(do=ListCommand.RUN))
     rig.run(15.0)
-    assert rig.operator.tasks is not None
-    assert rig.operator.tasks.progress.stage is JobStage.DONE
+    assert rig.operator.robot.tasks is not None
+    assert rig.operator.robot.tasks.progress.stage is JobStage.DONE

@@ -11,8 +11,8 @@ import pytest
 from robots.cubo import parameters as p
 from robots.cubo.body import COMMANDS, EVENTS, MEASURES, MOVES, CuboBody
 from robots.cubo.shapes import links, shapes
-from robots.ipr.body import DRIVES
-from robots.ipr.chassis import MobileReality
+from robots.mobile.body import DRIVES
+from robots.mobile.chassis import MobileReality
 from vrs.errors import InvalidValueError
 
 IDEAL = replace(MobileReality.ideal(), ramps=True)

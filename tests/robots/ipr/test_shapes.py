@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from robots.ipr.chassis import CHASSES, chassis
-from robots.ipr.robot import PLACES, place
-from robots.ipr.shapes import links, person_shape, room_shapes, shapes
+from robots.ipr.parameters import IPR, MICRO
+from robots.ipr.shapes import ipr_shapes, micro_shapes
+from robots.mobile.chassis import Chassis
+from robots.mobile.robot import PLACES, place
+from robots.mobile.shapes import links, person_shape, room_shapes
 from robots.solids import LinkShape
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
-KINDS = sorted(CHASSES)
+KINDS = [IPR, MICRO]
+
+
+def shapes(chassis: Chassis) -> tuple[LinkShape, ...]:
+    return ipr_shapes() if chassis is IPR else micro_shapes()
 
 
 def mesh(shape: LinkShape, X: Array | None = None) -> Any:
@@ -25,23 +31,23 @@ def mesh(shape: LinkShape, X: Array | None = None) -> Any:
 
 
 @lru_cache
-def whole(kind: str) -> Any:
-    poses = links(kind, (0, 0, 0), wheels=(0.3, 1.0))
-    return trimesh.util.concatenate([mesh(s, X) for s, X in zip(shapes(kind), poses, strict=True)])
+def whole(chassis: Chassis) -> Any:
+    poses = links(chassis, (0, 0, 0), wheels=(0.3, 1.0))
+    return trimesh.util.concatenate([mesh(s, X) for s, X in zip(shapes(chassis), poses, strict=True)])
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_body_is_closed_and_faces_outwards(kind: str) -> None:
-    for shape in shapes(kind):
+@pytest.mark.parametrize("chassis", KINDS, ids=lambda one: one.kind)
+def test_every_body_is_closed_and_faces_outwards(chassis: Chassis) -> None:
+    for shape in shapes(chassis):
         for body in mesh(shape).split(only_watertight=False):
             assert body.is_watertight, shape.name
             assert body.volume > 0, shape.name
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_robot_is_as_large_as_its_chassis_and_stands_on_the_floor(kind: str) -> None:
-    part = chassis(kind)
-    low, high = whole(kind).bounds
+@pytest.mark.parametrize("chassis", KINDS, ids=lambda one: one.kind)
+def test_a_robot_is_as_large_as_its_chassis_and_stands_on_the_floor(chassis: Chassis) -> None:
+    part = chassis
+    low, high = whole(chassis).bounds
     tolerance = 0.02 * part.length
     assert low[2] == pytest.approx(0.0, abs=1e-3)
     assert high[2] == pytest.approx(part.height, abs=tolerance)
@@ -49,14 +55,14 @@ def test_a_robot_is_as_large_as_its_chassis_and_stands_on_the_floor(kind: str) -
         (part.centre_x - part.length / 2, part.centre_x + part.length / 2), abs=tolerance
     )
     assert (low[1], high[1]) == pytest.approx((-part.width / 2, part.width / 2), abs=tolerance)
-    assert sum(len(shape.faces) for shape in shapes(kind)) <= 20_000
+    assert sum(len(shape.faces) for shape in shapes(chassis)) <= 20_000
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_links_are_where_the_posture_says(kind: str) -> None:
-    part = chassis(kind)
-    poses = links(kind, (2.0, 3.0, np.pi / 2), wheels=(np.pi / 2, 0.0), casters=(0.0, np.pi))
-    assert poses.shape == (len(shapes(kind)), 4, 4) == (5, 4, 4)
+@pytest.mark.parametrize("chassis", KINDS, ids=lambda one: one.kind)
+def test_links_are_where_the_posture_says(chassis: Chassis) -> None:
+    part = chassis
+    poses = links(chassis, (2.0, 3.0, np.pi / 2), wheels=(np.pi / 2, 0.0), casters=(0.0, np.pi))
+    assert poses.shape == (len(shapes(chassis)), 4, 4) == (5, 4, 4)
     assert poses[0][:3, 3] == pytest.approx([2, 3, 0])
     # The right wheel is to the right, and has turned forward by a quarter: its x axis points down.
     assert poses[1][:3, 3] == pytest.approx([2 + part.wheel_base / 2, 3, part.wheel_radius], abs=1e-12)
@@ -66,9 +72,7 @@ def test_links_are_where_the_posture_says(kind: str) -> None:
     assert poses[4][:3, 3] == pytest.approx([2 - y, 3 + x, 0], abs=1e-12)
     assert poses[4][:3, 0] == pytest.approx([0, -1, 0], abs=1e-12)
     with pytest.raises(InvalidValueError):
-        links(kind, (0, 0))
-    with pytest.raises(InvalidValueError, match="kind"):
-        shapes("cubo")
+        links(chassis, (0, 0))
 
 
 @pytest.mark.parametrize("name", PLACES)

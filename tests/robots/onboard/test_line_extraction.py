@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.floor_plan import FloorPlan
+from robots.mobile.floor_plan import FloorPlan
 from robots.onboard.laser import LaserScan, beam_angles, deskewed
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from vrs.model import Array

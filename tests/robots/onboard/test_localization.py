@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.chassis import MobileReality, Senses
-from robots.ipr.floor_plan import plan_map
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import MobileReality, Senses
+from robots.mobile.floor_plan import plan_map
+from robots.mobile.robot import BareBody
 from robots.onboard.laser import LaserModel
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig, Tracker
@@ -25,7 +26,7 @@ LASER = Senses(sonar=None, camera=None, laser=LaserModel(noise=0.005, dropouts=0
 
 
 def test_a_survey_covers_half_of_a_turn_at_first_and_all_of_it_after_one() -> None:
-    body = BareBody("ipr", room=ROOM, reality=MobileReality.ideal(dt=1 / 60), senses=LASER)
+    body = BareBody(IPR, room=ROOM, reality=MobileReality.ideal(dt=1 / 60), senses=LASER)
     surveyor, covered = Surveyor(), []
     for _ in range(90):
         body.follow(0.0, math.tau / 8.0)
@@ -43,7 +44,7 @@ def test_odometry_that_is_worse_than_it_was_said_is_trusted_less() -> None:
     known, ideal, most = plan_map(ROOM), MobileReality.ideal(dt=1 / 60), []
     for slip in (0.0, 0.1):
         body = BareBody(
-            "ipr", room=ROOM, reality=replace(ideal, slip_spread=slip, slip_time=2.0), senses=LASER, rng=1
+            IPR, room=ROOM, reality=replace(ideal, slip_spread=slip, slip_time=2.0), senses=LASER, rng=1
         )
         config = LocalizationConfig(motion=MotionConfig(wheel=0.002, base_error=0.001, rolling=0.001))
         tracker, unrest = Tracker(known, body.truth, np.diag([0.01, 0.01, 0.01]) ** 2, config), 1.0

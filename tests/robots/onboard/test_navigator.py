@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import read_room
-from robots.ipr.navigation import BodyNavigator
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.navigation import BodyNavigator
+from robots.mobile.robot import BareBody
 from robots.onboard.driving import Posture
 from robots.onboard.navigator import Navigator
 
@@ -19,7 +20,7 @@ MIDDLE, AT_WALL = Posture(3.0, 2.0, 0.0), Posture(1.0, 2.0, 0.0)
 
 def heard(echoes: dict[int, float], posture: Posture) -> Navigator:
     """A navigator that stands at a posture, after a scan of such echoes [m] by the sonars' numbers."""
-    body = BareBody("ipr", room=ROOM)
+    body = BareBody(IPR, room=ROOM)
     navigator = BodyNavigator(body, 0.05).navigator
     ranges = np.full(len(body.sonar_angles), math.inf)
     for k, r in echoes.items():
@@ -42,7 +43,7 @@ def test_something_behind_keeps_it_from_backing_and_what_is_ahead_is_the_lasers(
 
 def test_the_echo_of_a_known_wall_is_explained() -> None:
     """The wall is there anyhow: an echo of it, a cone wide, would only keep the robot from turning."""
-    body = BareBody("ipr", room=ROOM)
+    body = BareBody(IPR, room=ROOM)
     behind = AT_WALL.x + float(body.sonar_places[8, 0]) - 0.05
     assert way_back(heard({8: behind}, AT_WALL), AT_WALL) > 1.0
     assert way_back(heard({8: behind - 0.3}, AT_WALL), AT_WALL) < behind - 0.2

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import Room, read_room
-from robots.ipr.chassis import IPR, Senses
-from robots.ipr.navigation import route_map
-from robots.ipr.robot import BareBody
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import Senses
+from robots.mobile.navigation import route_map
+from robots.mobile.robot import BareBody
 from robots.onboard.laser import LaserModel, OdometryTrack
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from vrs.errors import InvalidValueError
@@ -32,7 +33,7 @@ def watched(
     """What a robot that turns on the spot has seen, and who moved in each scan."""
     roads = route_map(room, IPR.footprint)
     found = ObstacleMap(Grid((120, 80), 0.05), lambda places: roads.knows(places, 0.07), config)
-    body = BareBody("ipr", room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
+    body = BareBody(IPR, room=room, senses=Senses(sonar=None, camera=None, laser=LaserModel(noise=0.02)))
     track, movers, seen = OdometryTrack(), [], -1.0
     while body.time < seconds:
         track.add(body.time, body.reckoned)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from interfaces.lab.goals.scenes import Shortest
 from robots.bullet.rooms import Block, Room
-from robots.ipr.chassis import IPR
-from robots.ipr.navigation import route_config, route_map
+from robots.ipr.parameters import IPR
+from robots.mobile.navigation import route_config, route_map
 from robots.onboard.path import Arc, Pivot
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
 from vrs.errors import InvalidValueError

@@ -9,8 +9,9 @@ import pytest
 
 from interfaces.teleop.architectures import Immediate
 from interfaces.teleop.architectures.compositions import robot_surroundings
-from robots.ipr.position import FusedPosition
-from robots.ipr.robot import BareBody, place
+from robots.ipr.parameters import IPR
+from robots.mobile.position import FusedPosition
+from robots.mobile.robot import BareBody, place
 from robots.onboard.avoidance import SonarMount
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
@@ -38,7 +39,7 @@ def supervisor(known: np.ndarray | None = None, config: SupervisorConfig = AHEAD
 @pytest.mark.parametrize("seed", range(2))
 def test_an_unchanged_room_gives_no_new_cells(room: str, seed: int) -> None:
     """Some metres each through known rooms, with noise, lost echoes and the position that the robot has."""
-    body = BareBody("ipr", room=place(room).known(), rng=seed)
+    body = BareBody(IPR, room=place(room).known(), rng=seed)
     around = robot_surroundings(body, Posture(*body.posture.tolist()), Immediate(), 0.05)
     position, rng = FusedPosition(body), np.random.default_rng(seed)
     drive, wanted, told, way = Drive(0.0, 0.0), Drive(0.0, 0.0), 0, 0.0

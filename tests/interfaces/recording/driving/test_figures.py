@@ -12,7 +12,7 @@ import pytest
 from interfaces.cli.main import exit_status
 from interfaces.lab.driving.run import measure_recorded, name_of
 from interfaces.recording import open_recording
-from interfaces.recording.figures import driven, summary
+from interfaces.recording.figures import figures, summary
 from interfaces.recording.playback import Playback
 from interfaces.report.html import render_recording as render
 from interfaces.runs.drive_run import COLUMNS, METRICS, DriveCase, facts_of, row_of
@@ -107,12 +107,12 @@ def test_a_destroyed_block_is_left_out_and_told(tmp_path: Path) -> None:
     data[len(data) * 9 // 20] ^= 0x10
     (tmp_path / "torn.mcap").write_bytes(data)
     with open_recording(tmp_path / "torn.mcap") as recording:
-        found = driven(recording)
+        found = figures(recording)
         assert "damaged" in found.missing[0]
-        assert len(found.drive.t) == len(drive.t)
-        seen = np.isfinite(found.drive.real).all(axis=1)
+        assert len(found.run.t) == len(drive.t)
+        seen = np.isfinite(found.run.real).all(axis=1)
         assert 0 < np.count_nonzero(~seen) < 20
-        np.testing.assert_array_equal(found.drive.real[seen], drive.real[seen])
+        np.testing.assert_array_equal(found.run.real[seen], drive.real[seen])
         value = summary(recording)
         assert value["gap_s"] == pytest.approx(0.05 * (np.count_nonzero(~seen) + 1), abs=1e-9)
         assert value["path_error_max"] <= drive.compare().path_error_max + 1e-9
@@ -122,7 +122,7 @@ def test_a_destroyed_block_is_left_out_and_told(tmp_path: Path) -> None:
         for t in np.linspace(0.0, drive.t[-1], 100):
             frame = shown.moment(float(t)).frames[0]
             assert frame.error is None or np.isfinite(frame.error)
-        np.testing.assert_allclose(found.drive.virtual, drive.virtual, atol=1e-9)
+        np.testing.assert_allclose(found.run.virtual, drive.virtual, atol=1e-9)
 
 
 def test_flipped_bits_never_give_wrong_figures(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from interfaces.recording.rerun import rerun
 from interfaces.recording.run_recorders import DriveRecorder
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
 from interfaces.runs.drive_run import DriveCase
-from robots.ipr.robot import PLACES, place
+from robots.mobile.robot import PLACES, place
 from tests.interfaces.recording.disks import Failing
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
 from vrs.errors import FormatError

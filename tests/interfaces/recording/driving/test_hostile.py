@@ -14,7 +14,15 @@ from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording.playback import Playback
 from vrs.errors import FormatError
 
-FACTS = DriveFacts("bare", "timeline", "datagrams", "slalom", 10.0, 0.1, "fused")
+FACTS = DriveFacts(
+    body="bare",
+    architecture="timeline",
+    transport="datagrams",
+    operator="slalom",
+    length=10.0,
+    period=0.1,
+    position="fused",
+)
 BEGIN = Begin(
     t=0.0, robot="ipr", driver="laboratory", title="made", seed=1, delay="mon", offset="none", service="datagram",
     link_loss="hold", step=0.05, q=[0.0, 0.0, 0.0], lateness="postpone", software="test", drive=FACTS,

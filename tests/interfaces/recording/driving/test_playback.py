@@ -13,7 +13,7 @@ from interfaces.cli.main import exit_status
 from interfaces.recording import open_recording
 from interfaces.recording.marks import MarkKind
 from interfaces.recording.playback import Playback
-from interfaces.recording.stages import DriveStage
+from interfaces.recording.stages import Stage
 from tests.interfaces.pages import until, wait
 from tests.interfaces.recording.driving.runs import SLALOM, WANDER, recorded
 from tests.interfaces.recording.test_page import near, served
@@ -116,7 +116,7 @@ def test_a_report_has_the_figures_and_the_pictures(tmp_path: Path) -> None:
 def test_the_stage_shows_what_was_known_then() -> None:
     drive, path = recorded(WANDER)
     with open_recording(path) as recording:
-        stage = DriveStage(recording)
+        stage = Stage(recording)
         told = {}
         stage.scene.show = lambda **named: told.update(named)  # type: ignore[method-assign]
         playback = Playback([recording])

@@ -18,10 +18,11 @@ from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import echoes_of, grid_of
 from robots.bullet.rooms import EMPTY, Room, read_room
-from robots.ipr.chassis import IPR, SonarModel
-from robots.ipr.floor_plan import FloorPlan
-from robots.ipr.robot import BareBody, place
-from robots.ipr.sensing import SonarRing
+from robots.ipr.parameters import IPR
+from robots.mobile.chassis import SonarModel
+from robots.mobile.floor_plan import FloorPlan
+from robots.mobile.robot import BareBody, place
+from robots.mobile.sensing import SonarRing
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
@@ -238,7 +239,7 @@ def test_nobody_who_walks_through_is_run_into(seed: int) -> None:
 
 def test_on_a_drive_echoes_are_as_old_as_the_drive_says() -> None:
     """The body's own time is another one: it may have stood there for long."""
-    with BareBody("ipr", room=place("furnished"), rng=0) as body:
+    with BareBody(IPR, room=place("furnished"), rng=0) as body:
         while body.time < 5.0:
             body.drive(0.0, 0.0, 30)
         scan, own = echoes_of(body, 4.0), body.sonar

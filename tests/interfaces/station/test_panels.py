@@ -1,0 +1,26 @@
+"""Panels follow from what a server has."""
+
+from __future__ import annotations
+
+import pytest
+
+from interfaces.station.panels import PANELS, Offer, Panel, panels_of
+from vrs.errors import InvalidValueError
+
+ARM = """pane drag link control theme stop jog receipts plots terminal network record strip hints"""
+BASE = """floor link control theme stop drive map jobs camera deviation network record hints"""
+
+
+def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:
+    assert [p.name for p in panels_of({Offer.POLYNOMIALS, Offer.TERMINALS, Offer.RECORDINGS})] == ARM.split()
+    everything = {Offer.ARCS, Offer.JOBS, Offer.CAMERA, Offer.RECORDINGS}
+    assert [p.name for p in panels_of(everything)] == BASE.split()
+    bare = {p.name for p in panels_of({Offer.ARCS})}
+    assert {"floor", "drive", "deviation"} <= bare
+    assert not bare & {"map", "jobs", "camera", "record"}
+
+
+def test_every_panel_can_be_had_and_its_name_is_a_files() -> None:
+    assert set(panels_of(set(Offer))) == set(PANELS)
+    with pytest.raises(InvalidValueError, match="small letters"):
+        Panel("../x", "Elsewhere", "side")
