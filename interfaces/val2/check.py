@@ -179,7 +179,7 @@ class _Checker(ProgramCompiler):
 
     def _check(self, i: Instruction, n: int) -> None:
         self._statement = i
-        if i.passed is not None and i.keyword in forms.IGNORED - forms.UNAVAILABLE.keys() | STATEMENTS.keys():
+        if i.passed is not None and i.keyword not in forms.UNAVAILABLE:
             detail = f"{i.keyword} {i.passed}".rstrip() + " is passed over"
             self._warnings.append(ValError("No meaning here", detail, place=i.at))
         self._errors += [*self._names.wrong_calls(i), *_set_parameter(i)]
