@@ -400,6 +400,8 @@ class DriveFigures(_Figures):
             "duration_s": float(t[-1] - t[0]),
             "gap_s": self._gap(t),
             **facts_of(row_of(self.run)),
+            # Live, nobody counts a packet's bytes.
+            **({"sent_bytes": None} if self._live else {}),
         }
 
     @property

@@ -114,10 +114,10 @@ class DriveRun:
         """How many drives were beyond the robot's limits of speed and acceleration."""
         limits, slack = self.case.real[0].base.limits, 1 + 1e-9
         v, w = self.drives.T
-        lasted = np.diff(self.t, prepend=self.t[0] - CONTROL)
-        rise = (
-            np.abs(np.diff(v, prepend=0.0 if self.t[0] < CONTROL else v[0])) > limits.a_max * lasted * slack + 1e-12
-        )
+        # So many control periods may have begun between two samples, which live don't come just when one does.
+        periods = np.ceil(np.diff(self.t, prepend=self.t[0] - CONTROL) / CONTROL - 1e-6)
+        change = np.abs(np.diff(v, prepend=0.0 if self.t[0] < CONTROL else v[0]))
+        rise = change > limits.a_max * CONTROL * periods * slack + 1e-12
         return int(np.sum(rise | (np.abs(v) > limits.v_max * slack) | (np.abs(w) > limits.w_max * slack)))
 
     def match(self) -> PathMatch:
