@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
@@ -14,55 +14,77 @@ from interfaces.cli.run import text_of
 from robots.robot import USUAL
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from interfaces.val2.errors import CheckFinding
     from interfaces.val2.source import SourceFile
     from vrs.model import RobotModel
 
+_Found: TypeAlias = "tuple[Path, CheckFinding]"
+"""What was found, and in which file."""
 SUFFERED = 2
 """Exit code for a program that is wrong."""
 
 
 def check(
-    program: Annotated[Path, typer.Argument(metavar="PROGRAM.v2", help="File of VAL-II programs.")],
+    programs: Annotated[
+        list[Path], typer.Argument(metavar="PROGRAM.v2", help="Files of VAL-II programs and values.")
+    ],
+    program: Annotated[
+        str, typer.Option("--program", metavar="NAME", help="Which program is planned; the first unless given.")
+    ] = "",
     static: Annotated[
-        bool, typer.Option("--static", help="Only read the programs; don't plan what the first would do.")
+        bool, typer.Option("--static", help="Only read the programs; don't plan what one would do.")
     ] = False,
     name: RobotName = USUAL,
     as_json: Annotated[bool, typer.Option("--json", help="Write the findings as JSON on standard output.")] = False,
 ) -> int:
-    """Say what is wrong with a program: undefined names and labels, mixed types, places out of reach.
+    """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
 
     Exits 2 when there's an error; warnings alone don't count.
     """
-    from interfaces.val2.check import check_text
+    from interfaces.val2.check import check_files
 
-    source, found = check_text(text_of(program), program.name)
-    wrong = any(finding.severity == "error" for finding in found)
-    if source is not None and not static and not wrong:
-        found += _rehearsed(source, val_robot(name).arm)
+    checked = check_files([(text_of(path), path.name) for path in programs])
+    found = [(path, finding) for path, (_, some) in zip(programs, checked, strict=True) for finding in some]
+    sources = [source for source, _ in checked if source is not None]
+    if not static and not _wrong(found):
+        found += _rehearsed(dict(zip(programs, sources, strict=True)), program, val_robot(name).arm)
     found = _once(found)
-    wrong = any(finding.severity == "error" for finding in found)
     if as_json:
-        typer.echo(json.dumps({"file": str(program), "findings": [_row(finding) for finding in found]}, indent=2))
+        listed = [
+            {"file": str(path), "findings": [_row(finding) for where, finding in found if where == path]}
+            for path in programs
+        ]
+        typer.echo(json.dumps(listed[0] if len(listed) == 1 else listed, indent=2))
     else:
-        _show(program, found)
-    return SUFFERED if wrong else 0
+        _show(found)
+    return SUFFERED if _wrong(found) else 0
 
 
-def _rehearsed(source: SourceFile, model: RobotModel) -> list[CheckFinding]:
-    """What only planning shows: the first program on a virtual arm alone."""
+def _wrong(found: Sequence[_Found]) -> bool:
+    return any(finding.severity == "error" for _, finding in found)
+
+
+def _rehearsed(sources: Mapping[Path, SourceFile], program: str, model: RobotModel) -> list[_Found]:
+    """What only planning shows: a program on a virtual arm alone."""
     from interfaces.val2.playing import rehearse
+    from interfaces.val2.source import joined
 
-    return [replace(found, error=found.error.at(place=found.place)) for found in rehearse(source, model).findings]
+    path_of = {one.name: path for path, source in sources.items() for one in source.programs}
+    usual = next(iter(sources))
+    return [
+        (path_of.get(found.error.program, usual), replace(found, error=found.error.at(place=found.place)))
+        for found in rehearse(joined([*sources.values()], program), model).findings
+    ]
 
 
-def _once(found: list[CheckFinding]) -> list[CheckFinding]:
+def _once(found: list[_Found]) -> list[_Found]:
     """Without what was found at the same place before: a loop comes by many times."""
-    first: dict[tuple[object, ...], CheckFinding] = {}
-    for finding in found:
-        first.setdefault((finding.severity, finding.place, finding.error.what, finding.error.program), finding)
+    first: dict[tuple[object, ...], _Found] = {}
+    for path, finding in found:
+        key = (path, finding.severity, finding.place, finding.error.what, finding.error.program)
+        first.setdefault(key, (path, finding))
     return list(first.values())
 
 
@@ -79,15 +101,15 @@ def _row(finding: CheckFinding) -> dict[str, object]:
     }
 
 
-def _show(path: Path, found: Sequence[CheckFinding]) -> None:
-    for finding in found:
+def _show(found: Sequence[_Found]) -> None:
+    for path, finding in found:
         error, place = finding.error, finding.place
         where = str(path) if place is None else f"{path}:{place.line}:{place.column}"
         inside = f"program {error.program}" if error.program else ""
         inside += f", step {error.step}" if error.step is not None else ""
         detail = f"*{error.what}* {error.detail}".rstrip()
         typer.echo(f"{where}: {finding.severity}: {detail}" + (f" ({inside})" if inside else ""))
-    errors = sum(finding.severity == "error" for finding in found)
+    errors = sum(finding.severity == "error" for _, finding in found)
     warnings = len(found) - errors
     typer.echo(f"{_counted(errors, 'error')}, {_counted(warnings, 'warning')}.")
 

@@ -31,9 +31,12 @@ MAX_BYTES = 4 * 1024 * 1024
 
 
 def run(
-    program: Annotated[
-        Path, typer.Argument(metavar="PROGRAM.v2", help="File of VAL-II programs; its first is run.")
+    programs: Annotated[
+        list[Path], typer.Argument(metavar="PROGRAM.v2", help="Files of VAL-II programs and values.")
     ],
+    program: Annotated[
+        str, typer.Option("--program", metavar="NAME", help="Which program is run; the first unless given.")
+    ] = "",
     name: RobotName = USUAL,
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
@@ -46,7 +49,7 @@ def run(
         float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
     ] = 600.0,
 ) -> None:
-    """Run the first program of a file, once, on virtual and real robot across an emulated internet.
+    """Run a program of files, once, on virtual and real robot across an emulated internet.
 
     Standard output is what the program TYPEs; PROMPT reads standard input.
     """
@@ -55,11 +58,12 @@ def run(
     from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
     from interfaces.val2.playing import Listeners
+    from interfaces.val2.source import joined
     from interfaces.val2.twins import play
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, robot = read(program), val_robot(name)
+    source, robot = joined([read(path) for path in programs], program), val_robot(name)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 from typing_extensions import override
@@ -51,24 +51,34 @@ def _warning(error: ValError) -> CheckFinding:
 
 
 def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFinding]]:
-    """Read a file and check it.
+    """Read a file and check it; see `check_files`."""
+    (only,) = check_files([(text, name)])
+    return only
+
+
+def check_files(files: Sequence[tuple[str, str]]) -> list[tuple[SourceFile | None, list[CheckFinding]]]:
+    """Read files and check them, each with the programs and values of all.
 
     Args:
-        text: Text of the file.
-        name: Its name.
+        files: Texts and names.
 
     Returns:
-        What it holds, None if not every line could be read; and what was found, in the order of its lines.
+        Of each what it holds, None if not every line could be read; and what was found, in the order of its lines.
     """
-    source, unreadable, words = read_all(text, name)
-    found = [_error(error) for error in unreadable.values()]
-    if not source.programs and not unreadable:
-        found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
-    file = _File(source, unreadable.keys(), words)
-    for program in source.programs:
-        found += _Checker(program, file).findings()
-    found += _alike_names(text)
-    return None if unreadable else source, sorted(found, key=_order)
+    read = [read_all(*file) for file in files]
+    names, twice, checked = _Names(read), set[str](), list[tuple[SourceFile | None, list[CheckFinding]]]()
+    for (text, _), (source, unreadable, _) in zip(files, read, strict=True):
+        found = [_error(error) for error in unreadable.values()]
+        if not (names.programs or found or checked):
+            found.append(_error(ValError("Undefined program", "the file holds none", place=TextPosition(1, 1))))
+        for program in source.programs:
+            if program.name in twice:
+                found.append(_error(ValError("Duplicate program", program.name, place=program.at)))
+            twice.add(program.name)
+            found += _Checker(program, names, unreadable.keys()).findings()
+        found += _alike_names(text)
+        checked.append((None if unreadable else source, sorted(found, key=_order)))
+    return checked
 
 
 def _order(finding: CheckFinding) -> tuple[int, int]:
@@ -76,35 +86,35 @@ def _order(finding: CheckFinding) -> tuple[int, int]:
     return (0, 0) if place is None else (place.line, place.column)
 
 
-class _File:
-    """What a file sets, and what its programs take."""
+class _Names:
+    """What files set, and what their programs take."""
 
-    def __init__(self, source: SourceFile, unreadable: Collection[int], words: Collection[str]) -> None:
-        """Gather it.
-
-        Args:
-            source: The file.
-            unreadable: Numbers of lines in whose place others stand: nothing more is said of them.
-            words: Names that those lines may have set.
-        """
-        self.unreadable = unreadable
-        self.programs = {program.name: program for program in source.programs}
+    def __init__(self, read: Sequence[tuple[SourceFile, Mapping[int, ValError], Collection[str]]]) -> None:
+        """Gather it from files, their lines that can't be read, and the names that those may have set."""
+        self.programs: dict[str, Program] = {}
+        self._unknown: set[str] = set()
+        """Programs whose arguments can't be read."""
         self.context = Context(Arm(EngineRobot(Engine(puma560.model()))), compiled)
         """For what compiling shows; nothing runs in it."""
         self._set: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         """Names that are set, by the programs whose own they are, and the kinds of what they're set to; the empty
         name stands for all programs."""
-        for kind, entries in (("frame", source.locations), ("real", source.reals), ("string", source.strings)):
-            for entry in entries:
-                self._set[""][entry.variable.name].add(kind)
-        for program in source.programs:
-            own = _own(program)
-            self._set[program.name] |= {parameter.name: set() for parameter in program.parameters}
-            for i in (step.statement for step in program.steps):
-                for name in (variable.name for variable in _written(i)):
-                    self._set[program.name if name in own else ""][name].add(_given(i))
-        for word in words:
-            self._set[""][word].update()
+        for source, unreadable, words in read:
+            for kind, entries in (("frame", source.locations), ("real", source.reals), ("string", source.strings)):
+                for entry in entries:
+                    self._set[""][entry.variable.name].add(kind)
+            for program in source.programs:
+                self._gather(self.programs.setdefault(program.name, program))
+                self._unknown |= {program.name} if program.at.line in unreadable else set()
+            for word in words:
+                self._set[""][word].update()
+
+    def _gather(self, program: Program) -> None:
+        own = _own(program)
+        self._set[program.name] |= {parameter.name: set() for parameter in program.parameters}
+        for i in (step.statement for step in program.steps):
+            for name in (variable.name for variable in _written(i)):
+                self._set[program.name if name in own else ""][name].add(_given(i))
 
     def usable(self, program: Program) -> dict[str, set[str]]:
         """Names that a program may read, and the kinds of what they're set to."""
@@ -119,7 +129,7 @@ class _File:
         if called is None:
             close = nearest(i.program.upper(), [known.upper() for known in self.programs])
             yield ValError("Undefined program", f"{i.program}{close.lower()}", place=i.at)
-        elif i.keyword in ("CALL", "GOSUB") and called.at.line not in self.unreadable:
+        elif i.keyword in ("CALL", "GOSUB") and i.program not in self._unknown:
             parameters = called.parameters
             if len(i.operands) > len(parameters):
                 detail = f"{i.program} takes {len(parameters)}, and here are {len(i.operands)}"
@@ -138,12 +148,12 @@ def _own(program: Program) -> set[str]:
 class _Checker(ProgramCompiler):
     """Compiles a program to find out what is wrong with it, and goes on after what is wrong."""
 
-    def __init__(self, program: Program, file: _File) -> None:
+    def __init__(self, program: Program, names: _Names, unreadable: Collection[int]) -> None:
         found, self._errors = survey(program)
         jumps = defaultdict(int, found.jumps)
         blocks = defaultdict(lambda: StructureBlock("IF", 0, 0), found.blocks)
-        super().__init__(program, file.context, Structure(found.labels, jumps, blocks))
-        self._file, self._usable = file, file.usable(program)
+        super().__init__(program, names.context, Structure(found.labels, jumps, blocks))
+        self._names, self._usable, self._unreadable = names, names.usable(program), unreadable
         parameters = {parameter.name for parameter in program.parameters}
         self._known = {
             name: next(iter(kinds))
@@ -159,20 +169,20 @@ class _Checker(ProgramCompiler):
         """What is wrong with the program."""
         steps = {step.at.line: (n, step) for n, step in enumerate(self.program.steps)}
         for n, step in steps.values():
-            if step.at.line not in self._file.unreadable:
+            if step.at.line not in self._unreadable:
                 self._check(step.statement, n)
         for finding in (*map(_warning, self._warnings), *map(_error, self._errors)):
-            if finding.place is None or finding.place.line not in self._file.unreadable:
+            if finding.place is None or finding.place.line not in self._unreadable:
                 n, step = steps[finding.place.line] if finding.place is not None else (0, self.program.steps[0])
                 error = finding.error.at(program=self.program.name, step=n + 1, place=step.at)
                 yield CheckFinding(finding.severity, error, error.place)
 
     def _check(self, i: Instruction, n: int) -> None:
         self._statement = i
-        if i.passed is not None and i.keyword in forms.IGNORED - forms.UNAVAILABLE.keys() | STATEMENTS.keys():
+        if i.passed is not None and i.keyword not in forms.UNAVAILABLE:
             detail = f"{i.keyword} {i.passed}".rstrip() + " is passed over"
             self._warnings.append(ValError("No meaning here", detail, place=i.at))
-        self._errors += [*self._file.wrong_calls(i), *_set_parameter(i)]
+        self._errors += [*self._names.wrong_calls(i), *_set_parameter(i)]
         before = len(self._errors)
         try:
             compiled_step(self, n, i)

@@ -22,15 +22,6 @@ __all__ = [
 OPERATORS: Final = {row.name: row.help for row in functions.OPERATORS.values() if row.name.isalpha()}
 """Operators that are words."""
 
-IGNORED: Final = frozenset((
-    "ABORT", "ATTACH", "BITS", "CLEAR.EVENT", "CYCLE.END", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "EXECUTE",
-    "FCLOSE", "FCMND", "FDELETE", "FEMPTY", "FOPEN", "FOPENA", "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET",
-    "INTOFF", "INTON", "KILL", "LOCK", "MC", "MULTIPLE", "NOOVERLAP", "OVERLAP", "PRIME", "PROCEED", "REACTE",
-    "READ", "RELEASE", "RETRY", "RETURNE", "RUNSIG", "SELECT", "SET.EVENT", "SINGLE", "UNLOCK", "WEAVE",
-    "WINDOW", "WRITE",
-))  # fmt: skip
-"""Keywords that are recognised but have no meaning here: files, welding, other tasks."""
-
 _ONE_TASK: Final = "there is one program at a time; allowed: CALL program"
 UNAVAILABLE: Final = {
     **dict.fromkeys(("ABORT", "CYCLE.END", "EXECUTE", "KILL", "PRIME", "PROCEED", "RETRY"), _ONE_TASK),
@@ -43,7 +34,14 @@ UNAVAILABLE: Final = {
     "WEAVE": "allowed: MOVES location",
     "WINDOW": "there is no conveyor",
 }
-"""Those of them without whose work a program would do something else: an error where it comes there, and why."""
+"""Keywords without whose work a program would do something else: an error where it comes there, and why."""
+
+IGNORED: Final = UNAVAILABLE.keys() | {
+    "ATTACH", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "FCLOSE", "FCMND", "FDELETE", "FEMPTY", "FOPEN", "FOPENA",
+    "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET", "INTOFF", "INTON", "LOCK", "MULTIPLE", "NOOVERLAP", "OVERLAP",
+    "RELEASE", "SELECT", "SINGLE", "UNLOCK", "WRITE",
+}  # fmt: skip
+"""Keywords that are recognised but have no meaning here, with those: files, welding, other tasks."""
 
 WORDS: Final = {
     "ALWAYS": "Not for the next motion alone, but until it's changed.",

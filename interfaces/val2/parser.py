@@ -22,6 +22,7 @@ _INDENTED: Final = 250
 _BREAK: Final = re.compile(r"[\r\n]")
 _BEFORE: Final = re.compile(r"\s*(?:[0-9]+\.\??(?=\s|$)\s*)?(?:[0-9]+(?![A-Za-z0-9_.]))?\s*")
 """A step's number, and a label."""
+_NO_STATEMENT: Final = re.compile(r"$|;|#(?![A-Za-z])")
 _CODE: Final = re.compile(r'[^";#]*(?:(?:"[^"]*"|#(?=[A-Za-z]))[^";#]*)*')
 
 
@@ -76,7 +77,7 @@ def cached_step(text: str, line: int) -> Step:
     """The step of a line that is short enough; files repeat their lines."""
     label, statement, comment = grammar.read(text, "line", line)
     found = _BEFORE.match(text)
-    begin = 0 if found is None or text[found.end() :][:1] in ("", ";", "#") else found.end()
+    begin = 0 if found is None or _NO_STATEMENT.match(text, found.end()) else found.end()
     return Step(statement, label, comment, TextPosition(line, begin + 1))
 
 

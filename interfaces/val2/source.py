@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Final, TypeAlias
@@ -117,6 +117,39 @@ def parse_program(text: str) -> Program:
     if others:
         raise syntax_error("one program is allowed", others[0].at.line, 1)
     return program
+
+
+def joined(files: Sequence[SourceFile], program: str = "") -> SourceFile:
+    """Several files as one, named as the first; values of later ones take the place of earlier ones.
+
+    Args:
+        files: The files.
+        program: Which program comes first; the first there is if nothing is said.
+
+    Raises:
+        ValError: If it isn't there, or two programs have one name.
+    """
+    programs: dict[str, Program] = {}
+    for one in (one for file in files for one in file.programs):
+        if programs.setdefault(one.name, one) is not one:
+            raise ValError("Duplicate program", one.name)
+    wanted = name_of(program) if program else next(iter(programs), "")
+    if wanted not in programs:
+        known = f"{program}; allowed: {', '.join(programs)}" if programs else "the file holds no program"
+        raise ValError("Undefined program name", known)
+    first = programs.pop(wanted)
+
+    def latest(entries: Iterable[NamedValue]) -> tuple[NamedValue, ...]:
+        return tuple({entry.variable: entry for entry in entries}.values())
+
+    return SourceFile(
+        files[0].name,
+        (first, *programs.values()),
+        latest(entry for file in files for entry in file.locations),
+        latest(entry for file in files for entry in file.reals),
+        latest(entry for file in files for entry in file.strings),
+        tuple(rule for file in files for rule in file.signals),
+    )
 
 
 def directive(line: str) -> str:

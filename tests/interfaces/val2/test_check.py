@@ -243,6 +243,29 @@ def test_vrs_check_plans_the_first_program(tmp_path, capsys):
     assert capsys.readouterr().out == "no errors, no warnings.\n"
 
 
+def test_vrs_check_takes_programs_and_values_of_several_files(tmp_path, capsys):
+    program, values, other = (tmp_path / name for name in ("a.v2", "b.lc", "c.v2"))
+    program.write_text(".PROGRAM main\n  MOVE p\n  CALL other(x)\n.END\n")
+    values.write_text("# taught\n.LOCATIONS\np 9000 0 0 90 90 0\n.END\n")
+    other.write_text(".PROGRAM other(n)\n  n = y\n  MOVE q\n.END\n.PROGRAM main\n.END\n")
+    assert exit_code("check", str(program), "--static") == 2
+    assert "2 errors" in capsys.readouterr().out
+    assert exit_code("check", str(program), str(values), str(other)) == 2
+    assert capsys.readouterr().out.splitlines() == [
+        f"{other}:2:7: error: *Undefined value* y; nothing in the file sets it (program other, step 1)",
+        f"{other}:3:8: error: *Undefined location* q; nothing in the file sets it (program other, step 2)",
+        f"{other}:5:1: error: *Duplicate program* main",
+        "3 errors, no warnings.",
+    ]
+    other.write_text(".PROGRAM other(n)\n  n = 1\n.END\n")
+    assert exit_code("check", str(program), str(values), str(other)) == 2
+    assert capsys.readouterr().out.startswith(f"{program}:2:3: error: *Location out of range*")
+    assert exit_code("check", str(program), str(values), str(other), "--program", "other", "--json") == 0
+    assert [row["findings"] for row in json.loads(capsys.readouterr().out)] == [[], [], []]
+    assert exit_code("check", str(program), str(values), str(other), "--program", "none") == 2
+    assert "none; allowed: main, other" in capsys.readouterr().err
+
+
 def test_vrs_check_of_what_isnt_there_is_one_line(tmp_path, capsys):
     assert exit_code("check", str(tmp_path / "no.v2")) == 2
     said = capsys.readouterr().err

@@ -116,6 +116,7 @@ def test_a_line_has_a_label_a_comment_and_places():
     assert parse_line("") == parse_line("   \t")
     assert parse_line("").statement == BLANK
     assert parse_line("7 ;x").label == 7
+    assert (parse_line(" 7 #a = #b").at, parse_line(" # a").at) == (TextPosition(1, 4), TextPosition(1, 1))
     assert parse_line("REMARK it's \"so; or").comment == "it's \"so; or"
     program = parse_program("\n.PROGRAM p\r\n x = 1\r  y = -\t2\n.END")
     assert program.steps[1].statement.operands[1].at == TextPosition(4, 7)

@@ -171,6 +171,20 @@ def test_vrs_run_writes_what_the_demo_writes_and_types_nothing_else(tmp_path, ca
     assert (tmp_path / "out" / "report.html").stat().st_size > 10_000
 
 
+def test_vrs_run_takes_several_files_and_the_program_that_is_meant(tmp_path, capsys):
+    first, values, other = (tmp_path / name for name in ("a.v2", "b.lc", "c.v2"))
+    first.write_text(program("TYPE n", "CALL second", name="first"))
+    values.write_text(".REALS\nn 7\n.END\n")
+    other.write_text(program("TYPE n+1", name="second"))
+    files = (first, values, other)
+    assert vrs("run", *files, "--delay", "none", "--out", tmp_path / "out") == 0
+    assert capsys.readouterr().out == " 7\n 8\n"
+    assert vrs("run", *files, "--program", "second", "--delay", "none", "--out", tmp_path / "out") == 0
+    assert capsys.readouterr().out == " 8\n"
+    assert vrs("run", *files, "--program", "third", "--out", tmp_path / "none") == 2
+    assert "third; allowed: first, second" in capsys.readouterr().err
+
+
 def test_vrs_run_says_what_is_wrong_in_one_line(tmp_path, capsys):
     path = tmp_path / "job.v2"
     path.write_text(program("MOVE nowhere"))
