@@ -182,6 +182,20 @@ def test_a_drive_begins_at_rest_and_where_the_robot_is() -> None:
     assert robot.epoch == epoch + 1
 
 
+def test_no_drive_begins_while_the_robot_moves() -> None:
+    """Without a watchdog, too, which wouldn't let it."""
+    rig = Rig(hold=True)
+    rig.begin()
+    rig.run(1.5, rig.wish(0.3, 0.0))
+    robot, epoch = rig.robot, rig.robot.epoch
+    assert not robot.rests(now=rig.now)
+    robot.receive(
+        DriveOrders(Epoch(epoch + 1), 1, rig.now, rig.now, 0.0, rig.position.posture()),
+        now=rig.host.site_time(rig.now + rig.AHEAD),
+    )
+    assert robot.epoch == epoch
+
+
 def test_a_robot_that_never_takes_up_a_drive_is_given_up() -> None:
     rig = Rig()
     rig.run(3.5)
