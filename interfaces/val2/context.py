@@ -178,6 +178,10 @@ class Context:
     """Steps for which a dear one stands in addition."""
     dropped: int = 0
     """How often a REACTI braked before the motion that was asked for last had begun."""
+    moved: bool = False
+    """Whether a motion has been asked for."""
+    braked: bool = False
+    """Whether BRAKE or REACTI stopped the last motion."""
     asking: bool = False
     """Whether a PROMPT waits for a line."""
     answers: deque[str] = field(default_factory=lambda: deque(maxlen=1))
@@ -262,6 +266,11 @@ class Context:
         if not least <= value <= most:
             raise ValError("Illegal value", f"{name} {value:.9g}: {least:g} to {most:g}")
         self.parameters[name] = value
+
+    def brake(self) -> None:
+        """BRAKE, REACTI: stop the present motion at once."""
+        self.braked = not self.arm.settled(now=self.now)
+        self.arm.brake(now=self.now)
 
     def powered(self) -> None:
         """Motions ask this first.

@@ -7,6 +7,7 @@ read these tables. The rows of instructions are in `instructions.py`, those of f
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final
 
 from interfaces.val2 import functions
@@ -15,8 +16,8 @@ from interfaces.val2.instructions import INSTRUCTIONS
 from interfaces.val2.rows import PARAMETERS, SWITCHES
 
 __all__ = [
-    "ALIASES", "CONSTANTS", "FORMATS", "FUNCTIONS", "IGNORED", "INSTRUCTIONS", "OPERATORS", "PARAMETERS",
-    "SWITCHES", "UNAVAILABLE", "WORDS",
+    "ABBREVIATIONS", "ALIASES", "CONSTANTS", "FORMATS", "FUNCTIONS", "IGNORED", "INSTRUCTIONS", "OPERATORS",
+    "PARAMETERS", "SWITCHES", "UNAVAILABLE", "WORDS",
 ]  # fmt: skip
 
 OPERATORS: Final = {row.name: row.help for row in functions.OPERATORS.values() if row.name.isalpha()}
@@ -27,7 +28,6 @@ UNAVAILABLE: Final = {
     **dict.fromkeys(("ABORT", "CYCLE.END", "EXECUTE", "KILL", "PRIME", "PROCEED", "RETRY"), _ONE_TASK),
     **dict.fromkeys(("CLEAR.EVENT", "SET.EVENT"), "there are no events; allowed: SIGNAL number, WAIT SIG(number)"),
     **dict.fromkeys(("REACTE", "RETURNE"), "an error stops the program"),
-    "BITS": "allowed: SIGNAL number, ..",
     "MC": "commands are the monitor's",
     "READ": "there are no files; allowed: PROMPT text, variable",
     "RUNSIG": "allowed: SIGNAL number",
@@ -38,10 +38,26 @@ UNAVAILABLE: Final = {
 
 IGNORED: Final = UNAVAILABLE.keys() | {
     "ATTACH", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "FCLOSE", "FCMND", "FDELETE", "FEMPTY", "FOPEN", "FOPENA",
-    "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET", "INTOFF", "INTON", "LOCK", "MULTIPLE", "NOOVERLAP", "OVERLAP",
+    "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET", "INTOFF", "INTON", "MULTIPLE", "NOOVERLAP", "OVERLAP",
     "RELEASE", "SELECT", "SINGLE", "UNLOCK", "WRITE",
 }  # fmt: skip
 """Keywords that are recognised but have no meaning here, with those: files, welding, other tasks."""
+
+_NOT_HERE: Final = frozenset(
+    {"CALIBRATE", "ERROR", "ESTOP", "JHERE", "JMOVE", "MCS", "ROBOT", "SEE", "SWITCH", "TIME"}
+)
+"""Instructions of V+ that aren't here: they don't stand for others that begin like them."""
+
+
+def _abbreviations() -> dict[str, str]:
+    """Beginnings that only one instruction has, and the instruction, as VAL takes them."""
+    known = INSTRUCTIONS.keys() | IGNORED | _NOT_HERE
+    begun = Counter(word[:n] for word in known for n in range(1, len(word) + 1))
+    return {name[:n]: name for name in INSTRUCTIONS for n in range(1, len(name)) if begun[name[:n]] == 1}
+
+
+ABBREVIATIONS: Final = _abbreviations()
+"""What instructions may be abbreviated to."""
 
 WORDS: Final = {
     "ALWAYS": "Not for the next motion alone, but until it's changed.",
@@ -54,7 +70,7 @@ WORDS: Final = {
     "STEP": "Of FOR: what is added each time.",
     "DO": "Of WHILE: the steps up to END.",
     "OF": "Of CASE: the values up to END.",
-    "BY": "Of SHIFT: how far.",
+    "BY": "Of SHIFT and SCALE: how far, how much.",
 }
 """Words within a line."""
 

@@ -17,6 +17,7 @@ from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.formats import checked, leading_number
 from interfaces.val2.rows import Form
+from interfaces.val2.signals import group
 from interfaces.val2.syntax import Apply
 from interfaces.val2.values import (
     NULL,
@@ -128,6 +129,12 @@ def _shift(frame: Transformation, *way: float) -> Transformation:
     return Transformation(X)
 
 
+def _scale(frame: Transformation, factor: float) -> Transformation:
+    X = np.array(frame.X)
+    X[:3, 3] *= factor
+    return Transformation(X)
+
+
 def _frame(*frames: Transformation) -> Transformation:
     a, b, c, d = (frame.X[:3, 3] for frame in frames)
     along, aside = b - a, c - a
@@ -156,16 +163,28 @@ def _of_bits(act: Callable[[int, int], int]) -> Callable[[float, float], float]:
 
 
 def _bits(c: Context, first: float, count: float) -> float:
-    start, n = whole(first), whole(count)
-    if not 1 <= n <= 32:
-        raise ValError("Illegal value", f"{n}: 1 to 32 signals")
-    return float(sum(c.signals.on(start + i) << i for i in range(n)))
+    return float(sum(c.signals.on(number) << i for i, number in enumerate(group(first, count))))
 
 
 def _speed(c: Context, which: float) -> float:
     if which != 1.0:
         raise ValError("Illegal value", "SPEED(1) is the monitor speed")
     return c.arm.monitor_speed()
+
+
+def _state(c: Context, select: float) -> float:
+    """STATE; of V+'s numbers those that can be here.
+
+    STATE(1) is 7 under a program's control, 2 without power. STATE(2) is 0 before a motion, 1 on one, 2 at its end,
+    5 while it's braked, and 6 then.
+    """
+    if select == 1.0:
+        return 7.0 if c.switches["POWER"] else 2.0
+    if select != 2.0:
+        raise ValError("Illegal value", f"STATE({select:.9g}): 1 is of the robot, 2 of its motion")
+    if not c.moved:
+        return 0.0
+    return (5.0 if c.braked else 1.0) + c.arm.settled(now=c.now)
 
 
 _FUNCTIONS: Final = (
@@ -207,6 +226,7 @@ _FUNCTIONS: Final = (
     Form("SPEED", "which -> real", "1: the monitor speed [%].", "V+", _speed, tags="context"),
     Form("SQR", "x -> real", "Square.", "V+", lambda x: checked(x * x)),
     Form("SQRT", "x -> real", "Square root.", "VAL-II", root),
+    Form("STATE", "select -> real", "State of the robot (1), of its motion (2).", "V+", _state, tags="context"),
     Form("SWITCH", "name:name -> real", "Whether a switch is on.", "V+"),
     Form("TAN", "angle -> real", "Tangent of an angle [deg].", "V+",
          lambda angle: divide(sine(angle), cosine(angle))),
@@ -230,6 +250,8 @@ _FUNCTIONS: Final = (
          "A transformation [mm, deg]; without angles, no turn.", "VAL-II", from_oat),
     Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
          _shift, usage="SHIFT(a BY dx, dy, dz)"),
+    Form("SCALE", "a:frame, factor -> frame", "A location whose X, Y and Z are multiplied by a factor.", "V+",
+         _scale, usage="SCALE(a BY factor)"),
     Form("INVERSE", "a:frame -> frame", "The transformation back.", "VAL", Transformation.inverse),
     Form("FRAME", "a:frame, b:frame, c:frame, d:frame -> frame", "A frame at d: x from a to b, c on the side of y.",
          "VAL", _frame),
@@ -240,6 +262,8 @@ _FUNCTIONS: Final = (
     Form("HERE", "-> frame", "Where the tool is.", "VAL", lambda c: c.arm.here(now=c.now).tool,
          tags="constant context"),
     Form("DEST", "-> frame", "Where the tool goes.", "VAL-II", lambda c: c.arm.destination(now=c.now).tool,
+         tags="constant context"),
+    Form("TOOL", "-> frame", "The tool transformation in force.", "V+", lambda c: c.arm.tool(),
          tags="constant context"),
     Form("#PPOINT", "j1?=0, j2?=0, j3?=0, j4?=0, j5?=0, j6?=0 -> location", "A precision point [deg].", "VAL-II",
          _ppoint),

@@ -21,7 +21,7 @@ from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.functions import NEGATION, OPERATORS, row_of
 from interfaces.val2.instructions import STATEMENTS
 from interfaces.val2.rows import MISSING, TOO_MANY, Form, nearest
-from interfaces.val2.signals import SignalRule
+from interfaces.val2.signals import INPUTS, OUTPUTS, SignalRule
 from interfaces.val2.syntax import (
     BLANK,
     Apply,
@@ -163,6 +163,8 @@ def _lark() -> Node:
     keywords = {"passed": [*forms.IGNORED]}
     for row in forms.INSTRUCTIONS.values():
         keywords.setdefault(row.rule, []).append(row.name)
+    for short, name in forms.ABBREVIATIONS.items():
+        keywords[forms.INSTRUCTIONS[name].rule].append(short)
     terminals = [_terminal(rule, names, r"(?!\s*(\[|=(?!=)))") for rule, names in keywords.items()]
     (units, always), behind = forms.INSTRUCTIONS["SPEED"].words, r'(?=\s*([,;"A-Za-z]|$))'
     for name, words in (("unit", units), ("always", always)):
@@ -175,7 +177,14 @@ def _lark() -> Node:
         start=["line", "header", "cell", "expression"],
         maybe_placeholders=True,
         transformer=_Trees(),
+        lexer_callbacks={rule.upper(): _spelled_out for rule in keywords},
     )
+
+
+def _spelled_out(token: Node) -> Node:
+    """A keyword, in full where it's abbreviated."""
+    name = forms.ABBREVIATIONS.get(token.upper())
+    return token if name is None else token.update(value=name)
 
 
 def _terminal(name: str, words: Iterable[str], behind: str = "") -> str:
@@ -431,8 +440,8 @@ class _Trees:
         arguments = []
         for one in given:
             match type_of(one):
-                case "BY" if token.upper() != "SHIFT":
-                    raise ValError("Syntax error", "BY belongs in SHIFT", place=_at(one))
+                case "BY" if token.upper() not in ("SHIFT", "SCALE"):
+                    raise ValError("Syntax error", "BY belongs in SHIFT and SCALE", place=_at(one))
                 case "FORMAT" if token.upper() != "$ENCODE":
                     detail = f"a format such as {one} belongs in TYPE and $ENCODE"
                     raise ValError("Syntax error", detail, place=_at(one))
@@ -557,7 +566,7 @@ def _wait(i: Instruction) -> Instruction:
         return i
     (condition,) = i.operands
     at = condition.at if isinstance(condition, Number) else condition.arguments[0].at
-    channel = Number(abs(value) + 1000 if abs(value) <= 32 else abs(value), at)
+    channel = Number(abs(value) + INPUTS[0] - 1 if abs(value) <= OUTPUTS[-1] else abs(value), at)
     return replace(i, operands=(Apply("SIG", (channel if value > 0 else Apply("-", (channel,), at),), at),))
 
 

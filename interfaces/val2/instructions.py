@@ -36,6 +36,7 @@ from interfaces.val2.expressions import Expressions, kind_of
 from interfaces.val2.functions import OPERATORS, whole
 from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
+from interfaces.val2.motion.speeds import require
 from interfaces.val2.rows import Form, OperandSlot, Origin
 from interfaces.val2.signals import reaction_to
 from interfaces.val2.structure import Structure, structure
@@ -184,6 +185,28 @@ def _configure(c: Context, i: Instruction) -> None:
     c.stop_first = True
 
 
+def _hand(i: Instruction, opening: float | None) -> float | bool:
+    """What OPEN, CLOSE, OPENI and CLOSEI want of the hand: an opening [mm], or open or closed.
+
+    Raises:
+        ValError: If the opening is negative.
+    """
+    require(opening is None or opening >= 0.0, opening, "an opening is 0 mm or above")
+    return i.keyword.startswith("OPEN") if opening is None else opening
+
+
+def _hand_with_motion(c: Context, i: Instruction, opening: float | None) -> None:
+    c.arm.set_hand(_hand(i, opening))
+
+
+def _hand_now(c: Context, i: Instruction, opening: float | None) -> None:
+    c.arm.actuate(_hand(i, opening), now=c.now)
+
+
+def _check_hand(_: Context, i: Instruction, opening: float | None) -> None:
+    _hand(i, opening)
+
+
 def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> None:
     c.timers[c.timer(number)] = c.now - seconds
 
@@ -214,11 +237,17 @@ def _base(c: Context, _: Instruction, first: float | Transformation, *others: fl
     c.arm.set_base(first)
 
 
+def _lock(c: Context, _: Instruction, priority: float) -> None:
+    """Reactions have the lowest priority above 0, so that any priority above 0 defers all of them."""
+    require(priority >= 0.0, priority, "a priority is 0 or above")
+    c.reactions.locked = priority > 0.0
+
+
 # How it's waited for.
 
 
 Pause: TypeAlias = Generator[float, None, None]
-_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED"}
+_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED", "STATE"}
 """Functions whose values change with time alone."""
 
 
@@ -248,7 +277,8 @@ def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None
         yield from until(context, context.arm.settled if context.stop_first else context.arm.ready)
         context.powered()
         ask()
-        context.stop_first = False
+        context.stop_first = context.braked = False
+        context.moved = True
         dropped = context.dropped
         yield from until(context, context.arm.ready)
         if context.dropped == dropped:
@@ -727,8 +757,7 @@ _ROWS: Final = (
     Form("DELAY", "seconds:seconds", "Stand still for a time, as a motion.", "VAL",
          _motion(lambda c, _, seconds: c.arm.delay(seconds, now=c.now))),
     Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(_nothing)),
-    Form("BRAKE", "", "Stop the present motion at once.", "V+",
-         _at_rest(_nothing, lambda c, _: c.arm.brake(now=c.now))),
+    Form("BRAKE", "", "Stop the present motion at once.", "V+", _at_rest(_nothing, lambda c, _: c.brake())),
     Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
          _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]", rule="timed"),
     # Settings.
@@ -776,14 +805,16 @@ _ROWS: Final = (
          rule="channel"),
     Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
     # Hand.
-    Form("OPEN", "", "Open the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(True))),
-    Form("CLOSE", "", "Close the hand with the next motion.", "VAL", _now(lambda c, _: c.arm.set_hand(False))),
+    Form("OPEN", "opening?", "Open the hand, or to an opening [mm], with the next motion.", "VAL",
+         _now(_hand_with_motion)),
+    Form("CLOSE", "opening?", "Close the hand, or to an opening [mm], with the next motion.", "VAL",
+         _now(_hand_with_motion)),
     Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
          _now(lambda c, _: c.arm.set_hand(None))),
-    Form("OPENI", "", "Open the hand now, where the arm stands.", "VAL",
-         _at_rest(lambda c, _: c.arm.actuate(True, now=c.now))),
-    Form("CLOSEI", "", "Close the hand now, where the arm stands.", "VAL",
-         _at_rest(lambda c, _: c.arm.actuate(False, now=c.now))),
+    Form("OPENI", "opening?", "Open the hand, or to an opening [mm], now, where the arm stands.", "VAL",
+         _at_rest(_hand_now, _check_hand)),
+    Form("CLOSEI", "opening?", "Close the hand, or to an opening [mm], now, where the arm stands.", "VAL",
+         _at_rest(_hand_now, _check_hand)),
     Form("RELAXI", "", "Let the hand go slack now, where the arm stands.", "VAL",
          _at_rest(lambda c, _: c.arm.actuate(None, now=c.now))),
     Form("GRASP", "opening, label:label?", "Close the hand; go to a label if it's less open than that [mm].", "VAL",
@@ -800,6 +831,9 @@ _ROWS: Final = (
     # Signals and time.
     Form("SIGNAL", "number:output*", "Turn outputs on, or off where negative.", "VAL",
          _now(lambda c, _, *numbers: c.signals.set(numbers)), tags="beside"),
+    Form("BITS", "first:output, count?=1, value", "Turn a group of signals on or off, by the bits of a value.",
+         "V+", _now(lambda c, _, *group: c.signals.set_group(*group)), usage="BITS first[, count] = value",
+         tags="beside", rule="group"),
     Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
     Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
     Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
@@ -811,6 +845,8 @@ _ROWS: Final = (
          words="ALWAYS"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
          _now(lambda c, _, signal: c.reactions.ignore(signal))),
+    Form("LOCK", "priority", "Let reactions wait, until LOCK 0 or the end of the one that says it.", "V+",
+         _now(_lock)),
     # Control.
     Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program", rule="branch"),

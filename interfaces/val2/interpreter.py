@@ -199,6 +199,8 @@ class Task:
             frame.waiting = Waiting(_resting(self.context))
             return
         self._release(self.frames.pop())
+        if frame.level > self.frames[-1].level:
+            self.context.reactions.locked = False
 
     def _release(self, frame: CallFrame) -> None:
         for slot in frame.slots[len(frame.code.program.parameters) : frame.code.names]:
@@ -234,7 +236,7 @@ class Task:
         context = self.context
         if reaction.immediate:
             context.dropped += not context.arm.ready(now=context.now)
-            context.arm.brake(now=context.now)
+            context.brake()
         if not reaction.program:
             self._leave(frame)
             return

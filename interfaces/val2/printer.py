@@ -102,8 +102,8 @@ def _variable(variable: Variable) -> str:
 def _called(e: Apply) -> str:
     if not e.arguments:
         return e.function if "constant" in row_of(e).tags else f"{e.function}()"
-    if e.function == "SHIFT" and len(e.arguments) > 1:
-        return f"SHIFT({_item(e.arguments[0])} BY {_listed(e.arguments[1:])})"
+    if e.function in ("SHIFT", "SCALE") and len(e.arguments) > 1:
+        return f"{e.function}({_item(e.arguments[0])} BY {_listed(e.arguments[1:])})"
     return f"{e.function}({_listed(e.arguments)})"
 
 
@@ -135,8 +135,9 @@ def print_statement(statement: Instruction) -> str:
         return f"AT {print_expression(statement.begins)} {print_statement(replace(statement, begins=None))}"
     keyword, words, listed = statement.keyword, statement.words, _listed(statement.operands)
     match STATEMENTS[keyword].rule, [_item(operand) for operand in statement.operands]:
-        case "assignment" | "set" | "timing", [target, value]:
-            return f"{keyword} {target} = {value}".removeprefix("= ")
+        case "assignment" | "set" | "timing" | "group", [*_, value]:
+            targets = ", ".join(_spelled(one, _COMPOUND) for one in statement.operands[:-1] if one is not None)
+            return f"{keyword} {targets} = {value}".removeprefix("= ")
         case "parameter", [value]:
             return f"{keyword} {words[0]} = {value}"
         case "branch", [condition, *label]:

@@ -1,4 +1,4 @@
-"""Digital signals: outputs 1 to 32, inputs 1001 to 1032, internal ones 2001 to 2032; simulated cells; reactions.
+"""Digital signals: outputs 1 to 512, inputs 1001 to 1512, internal ones 2001 to 2512; simulated cells; reactions.
 
 A cell is a run of rules, the lines of a file's `.SIGNALS`: what sets the inputs where no factory does. An input
 takes the value of an expression once it has held that value for the rule's delay without a break, as a part is
@@ -6,7 +6,7 @@ there when the belt has run for so long.
 
 REACT and REACTI watch signals. A reaction is to a turning of the signal after REACT. It's done once, or with ALWAYS
 each time. While the program that it calls runs, other reactions wait; a REACTI alone comes into the program of a
-REACT.
+REACT. LOCK lets all of them wait.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from typing import Final
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
 from interfaces.val2.syntax import Expression
 
-OUTPUTS: Final = range(1, 33)
-INPUTS: Final = range(1001, 1033)
-INTERNAL: Final = range(2001, 2033)
+OUTPUTS: Final = range(1, 513)
+INPUTS: Final = range(1001, 1513)
+INTERNAL: Final = range(2001, 2513)
 SOONEST: Final = 1e-3
 """A rule acts at least so much later than what it waits for [s]: rules in a circle take time."""
 MOST_RULES: Final = 200
+MOST_IN_GROUP: Final = 32
+"""Signals that BITS has at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +57,19 @@ class SignalRule:
             raise ValError("Invalid signal rule", f"{self.signal}: a cell sets inputs and internal signals")
 
 
+_KNOWN: Final = frozenset({*OUTPUTS, *INPUTS, *INTERNAL})
+_SETTABLE: Final = frozenset({*OUTPUTS, *INTERNAL})
+
+
 def legal(number: float) -> int:
     """The number of a signal, without its sign.
 
     Raises:
         ValError: If there's no such signal.
     """
-    return _one_of(number, (OUTPUTS, INPUTS, INTERNAL))
+    if abs(number) in _KNOWN:
+        return abs(int(number))
+    raise _illegal(number, OUTPUTS, INPUTS, INTERNAL)
 
 
 def settable(number: float) -> int:
@@ -70,14 +78,29 @@ def settable(number: float) -> int:
     Raises:
         ValError: If there's no such signal.
     """
-    return _one_of(number, (OUTPUTS, INTERNAL)) if number else 0
-
-
-def _one_of(number: float, groups: Sequence[range]) -> int:
-    if any(abs(number) in group for group in groups):
+    if not number or abs(number) in _SETTABLE:
         return abs(int(number))
+    raise _illegal(number, OUTPUTS, INTERNAL)
+
+
+def group(first: float, count: float) -> range:
+    """The numbers of a group of signals.
+
+    Raises:
+        ValError: If there are signals of the group that aren't there, or there are too many.
+    """
+    if not 1 <= count <= MOST_IN_GROUP:
+        raise ValError("Illegal value", f"{count:.9g}: 1 to {MOST_IN_GROUP} signals")
+    numbers = range(int(first), int(first) + int(count))
+    for number in (numbers[0], numbers[-1]):
+        if legal(number) != number:
+            raise _illegal(number, OUTPUTS, INPUTS, INTERNAL)
+    return numbers
+
+
+def _illegal(number: float, *groups: range) -> ValError:
     allowed = ", ".join(f"{group[0]} to {group[-1]}" for group in groups)
-    raise ValError("Illegal digital signal", f"{number:.9g}; allowed: {allowed}")
+    return ValError("Illegal digital signal", f"{number:.9g}; allowed: {allowed}")
 
 
 class Signals:
@@ -110,6 +133,19 @@ class Signals:
         for number in wanted:
             self._turn(abs(number), number > 0)
 
+    def set_group(self, first: float, count: float, value: float) -> None:
+        """BITS: turn the signals of a group on where a number's bits are set, the lowest first, and the others off.
+
+        Raises:
+            ValError: If one of them is none of those that SIGNAL turns, or the number has other bits.
+        """
+        numbers = group(first, count)
+        settable(numbers[0])
+        most = (1 << len(numbers)) - 1
+        if not 0 <= value <= most or value % 1:
+            raise ValError("Illegal value", f"{value:.9g}: 0 to {most} for {len(numbers)} signals")
+        self.set(number if int(value) >> i & 1 else -number for i, number in enumerate(numbers))
+
     def force(self, number: float) -> None:
         """Turn any signal on, or off if negative, inputs too: what a factory does, or a monitor in its stead.
 
@@ -120,7 +156,7 @@ class Signals:
 
     def reset(self) -> None:
         """RESET: all outputs off."""
-        for number in OUTPUTS:
+        for number in sorted(self._on.intersection(OUTPUTS)):
             self._turn(number, on=False)
 
     def states(self, numbers: Sequence[int]) -> list[bool]:
@@ -220,6 +256,8 @@ class Reactions:
     def __init__(self) -> None:
         self._watched: dict[int, Reaction] = {}
         self._turned: list[Reaction] = []
+        self.locked = False
+        """Whether reactions wait for LOCK 0."""
 
     def add(self, reaction: Reaction) -> None:
         """REACT, REACTI: watch a signal; this takes the place of what was watched of it.
@@ -242,9 +280,10 @@ class Reactions:
         self._turned = [r for r in self._turned if abs(r.signal) != number]
 
     def clear(self) -> None:
-        """Watch nothing."""
+        """Watch nothing, and lock nothing."""
         self._watched.clear()
         self._turned.clear()
+        self.locked = False
 
     def notice(self, number: int, on: bool) -> None:
         """A signal has turned."""
@@ -253,9 +292,9 @@ class Reactions:
             self._turned.append(reaction)
 
     def due(self, level: int) -> Reaction | None:
-        """The most urgent reaction whose signal has turned, above a level; it's taken off."""
+        """The most urgent reaction whose signal has turned, above a level; it's taken off. None while locked."""
         above = [r for r in self._turned if r.level > level]
-        if not above:
+        if self.locked or not above:
             return None
         reaction = max(above, key=lambda r: r.level)
         self._turned.remove(reaction)

@@ -21,6 +21,8 @@ FOREVER: Final = -1
 """Cycles that never end."""
 POWER: Final = "POWER"
 """The switch without which the arm doesn't move."""
+_IN_A_LINE: Final = 32
+"""Signals of a line of IO."""
 _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 
 
@@ -221,12 +223,14 @@ def signal(state: TerminalState, rest: str) -> None:
 
 
 def io(state: TerminalState, _rest: str) -> None:
-    """IO: a table of all signals, 1 for on."""
+    """IO: a table of signals, 1 for on; of those behind the first 32, lines in which one is on."""
     signals = state.controller.signals
     for title, numbers in (("Outputs", OUTPUTS), ("Inputs", INPUTS), ("Internal", INTERNAL)):
-        states = ["1" if on else "0" for on in signals.states(numbers)]
-        eights = " ".join("".join(states[k : k + 8]) for k in range(0, len(states), 8))
-        state.say(f"{title:8}  {numbers[0]:4} {eights} {numbers[-1]}")
+        for row in (numbers[k : k + _IN_A_LINE] for k in range(0, len(numbers), _IN_A_LINE)):
+            states = ["1" if on else "0" for on in signals.states(row)]
+            if row[0] == numbers[0] or "1" in states:
+                eights = " ".join("".join(states[k : k + 8]) for k in range(0, len(states), 8))
+                state.say(f"{title:8}  {row[0]:4} {eights} {row[-1]}")
 
 
 def calibrate(state: TerminalState, _rest: str) -> Dialogue:

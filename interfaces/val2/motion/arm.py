@@ -340,8 +340,11 @@ class Arm(SettingsInForce):
         if self._dry is None:
             self._delay = max(now, self._delay_span()[1]), seconds
 
-    def actuate(self, hand: bool | None, *, now: float) -> None:
-        """OPENI (True), CLOSEI (False), RELAXI (None): now, where the arm stands; `settled` waits for it."""
+    def actuate(self, hand: float | bool | None, *, now: float) -> None:
+        """OPENI (True, or an opening [mm]), CLOSEI (False, or one), RELAXI (None): now, where the arm stands.
+
+        `settled` waits for it.
+        """
         self._update(now)
         if self._dry is None:
             self._hand.actuate(hand, now)

@@ -109,8 +109,8 @@ class Hand:
             order = self._orders.pop(0)
             self._move(order.to, order.holds, t)
 
-    def actuate(self, hand: bool | None, now: float) -> None:
-        """Open (True), close or relax (None) it now."""
+    def actuate(self, hand: float | bool | None, now: float) -> None:
+        """Open (True), close (False) or relax (None) it now, or move it to an opening [mm]."""
         self._move(*((self._to, False) if hand is None else _meaning(hand)), now)
 
     def forget(self) -> None:

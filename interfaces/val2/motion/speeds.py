@@ -96,8 +96,8 @@ class SettingsInForce:
     def __init__(self) -> None:
         self.always = self.next = MotionSettings()
 
-    def set_hand(self, hand: bool | None) -> None:
-        """OPEN, CLOSE, RELAX: with the next motion."""
+    def set_hand(self, hand: float | bool | None) -> None:
+        """OPEN, CLOSE, RELAX, or to an opening [mm]: with the next motion."""
         self._change(False, hand=hand, relaxes=hand is None)
 
     def set_configuration(self, word: str) -> None:

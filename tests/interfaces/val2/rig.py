@@ -163,13 +163,13 @@ class FakeArm:
         """DELAY."""
         self._motion(now, "delay", seconds, last=seconds)
 
-    def actuate(self, hand: bool | None, *, now: float) -> None:
+    def actuate(self, hand: float | bool | None, *, now: float) -> None:
         """OPENI and its like."""
         there = self.destination(now=now)
-        opening = there.hand if hand is None else 100.0 if hand else 0.0
+        opening = {None: there.hand, True: 100.0, False: 0.0}[hand] if isinstance(hand, bool | None) else hand
         self._motion(now, "actuate", hand, to=Where(there.tool, there.joints, opening))
 
-    def set_hand(self, hand: bool | None) -> None:
+    def set_hand(self, hand: float | bool | None) -> None:
         """OPEN and its like."""
         self._note(self._seen, "set_hand", hand)
 

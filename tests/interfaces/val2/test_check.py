@@ -71,11 +71,12 @@ def found(*lines, sections=""):
         ('PROMPT "x", #q', "Variable type mismatch", 13),
         ("DECOMPOSE $a[0] = HERE", "Variable type mismatch", 11),
         ("DECOMPOSE #a[0] = HERE", "Variable type mismatch", 11),
-        ("IF SIG(1, 33) GOTO 7", "Illegal digital signal", 11),
-        ("SIGNAL 33", "Illegal digital signal", 8),
+        ("IF SIG(1, 513) GOTO 7", "Illegal digital signal", 11),
+        ("SIGNAL 513", "Illegal digital signal", 8),
         ("SIGNAL 1.5", "Illegal digital signal", 8),
+        ("BITS 1001, 4 = 5", "Illegal digital signal", 6),
         ("IGNORE 0", "Illegal digital signal", 8),
-        ("REACT -1033", "Illegal digital signal", 7),
+        ("REACT -1513", "Illegal digital signal", 7),
         ("TIMER 16 = 0", "Value out of range", 7),
         ("ALTER (1) 4", "Value out of range", 11),
         ("WAIT .5", "Illegal digital signal", 6),
@@ -294,7 +295,7 @@ def test_types_over_several_lines(lines, line, what, column):
     "lines",
     [
         ["SET #q = HERE", "SET #r = DEST", "SET #s = #q", "SET p = HERE", "y = 1", "MOVE #q"],
-        ["SIGNAL 0, -32, 2032", "IGNORE 1001", "REACT -2001", "x = SIG(-1032)"],
+        ["SIGNAL 0, -512, 2512", "IGNORE 1001", "REACT -2001", "x = SIG(-1512)"],
         ['$s = "a"', "CASE $s OF", 'VALUE "a", $s + "b":', "END", "CASE 1 OF", "VALUE 1, 2:", "ANY", "END"],
     ],
 )
@@ -357,7 +358,7 @@ def test_faults_beside_one_that_cant_be_read_are_still_found():
 
 
 @pytest.mark.parametrize(
-    "line", ["EXECUTE 1 bg", "ABORT 1", "READ (5) x", "WEAVE 3, 1", "MC LOAD a", "SET.EVENT 1", "BITS 1, 8 = 5"]
+    "line", ["EXECUTE 1 bg", "ABORT 1", "READ (5) x", "WEAVE 3, 1", "MC LOAD a", "SET.EVENT 1"]
 )
 def test_what_a_program_cant_go_without_is_an_error(line):
     ((severity, what, detail, *_),) = found(line)

@@ -111,7 +111,7 @@ def test_values_of_strings(text: str, value: str) -> None:
         ("SQR(1E300)", "Arithmetic overflow", None),
         ("1E300 BAND 1", "Illegal value", None),
         ("SIG(0)", "Illegal digital signal", 1),
-        ("SIG(33)", "Illegal digital signal", 1),
+        ("SIG(513)", "Illegal digital signal", 1),
         ("SIG(1.5)", "Illegal digital signal", 1),
         ("TIMER(99)", "Illegal timer number", 1),
         ("$CHR(256)", "Illegal value", 1),
@@ -164,6 +164,7 @@ def test_functions_of_locations() -> None:
             "SET c = a:b:RZ(30)",
             "SET d = INVERSE(a):a",
             "SET e = SHIFT(a BY 5,,-10)",
+            "SET g = SCALE(a BY 1.25)",
             "SET f = FRAME(TRANS(1,1,1),TRANS(1,5,1),TRANS(1,1,9),a)",
             "SET #q = #PPOINT(1,2,3,,5)",
             "DECOMPOSE n[1] = e",
@@ -183,11 +184,21 @@ def test_functions_of_locations() -> None:
     np.testing.assert_allclose(pose("d"), np.eye(4), atol=1e-12)
     np.testing.assert_allclose(pose("e")[:3, 3], [105, 200, 290])
     np.testing.assert_array_equal(pose("e")[:3, :3], a.X[:3, :3])
+    np.testing.assert_allclose(pose("g")[:3, 3], [125, 250, 375])
+    np.testing.assert_array_equal(pose("g")[:3, :3], a.X[:3, :3])
     np.testing.assert_allclose(pose("f")[:3, :3], np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]).T, atol=1e-15)
     np.testing.assert_allclose(pose("f")[:3, 3], [100, 200, 300])
     assert rig.value("#q") == PrecisionPoint((1.0, 2.0, 3.0, 0.0, 5.0, 0.0))
     assert [rig.value(f"n[{i}]") for i in range(1, 7)] == pytest.approx([105, 200, 290, 10, 20, 30])
     assert [rig.value(f"j[{i}]") for i in range(6)] == [1.0, 2.0, 3.0, 0.0, 5.0, 0.0]
+
+
+def test_tool_is_the_transformation_in_force() -> None:
+    rig = Rig()
+    assert rig.value("TOOL") == NULL
+    rig.run(body("TOOL TRANS(0,0,100)", "SET t = HERE:INVERSE(TOOL)", "TOOL TOOL:RZ(90)", "TYPE DZ(TOOL)"))
+    assert rig.typed() == " 100\n"
+    assert rig.value("DZ(t)") == -100.0
 
 
 def test_trans_without_angles_turns_nothing() -> None:

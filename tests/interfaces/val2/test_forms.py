@@ -35,6 +35,13 @@ def test_the_reference_has_switches_parameters_and_what_is_passed_over():
         assert f"`{word}`" in REFERENCE
 
 
+def test_abbreviations_are_of_one_instruction_alone():
+    words = [*forms.INSTRUCTIONS, *forms.IGNORED]
+    for short, name in forms.ABBREVIATIONS.items():
+        assert [word for word in words if word.startswith(short)] == [name]
+        assert short != name
+
+
 def test_no_word_is_two_things():
     assert not forms.IGNORED & forms.INSTRUCTIONS.keys()
     assert not forms.OPERATORS.keys() & forms.FUNCTIONS.keys()

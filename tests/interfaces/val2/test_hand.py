@@ -30,6 +30,12 @@ def test_a_hand_that_relaxes_with_a_motion_lets_go_where_it_is() -> None:
     assert not hand.waits
 
 
+def test_a_hand_moves_now_to_an_opening() -> None:
+    hand = Hand({"HAND.TIME": 1.0}, None)
+    hand.actuate(40.0, 0.0)
+    assert [hand.opening(t) for t in (0.0, 0.5, 1.0)] == [100.0, 70.0, 40.0]
+
+
 def test_what_the_hand_did_can_be_looked_back_at() -> None:
     hand = Hand({"HAND.TIME": 1.0}, None)
     for t, does in ((1.0, False), (1.5, True), (4.0, None), (5.0, False)):

@@ -248,7 +248,7 @@ def test_an_error_names_program_step_and_column_and_nothing_is_half_done() -> No
     assert rig.arm.names() == ["begin_program"]
     rig = Rig()
     with pytest.raises(ValError, match="Illegal digital signal"):
-        rig.run(body("SIGNAL 1, 99"))
+        rig.run(body("SIGNAL 1, 999"))
     assert not rig.when(SignalChanged)
 
 

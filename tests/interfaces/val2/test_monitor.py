@@ -229,9 +229,14 @@ def test_signals_are_set_shown_and_reset(sitting):
     assert re.search(r"Outputs +1 10000000 ", shown)
     assert re.search(r"Inputs +1001 00100000 ", shown)
     assert re.search(r"Internal +2001 10000000 ", shown)
+    sitting.type("SIGNAL 34,1512")
+    shown = sitting.type("IO")
+    assert re.search(r"Outputs +33 01000000 .* 64\b", shown)
+    assert re.search(r"Inputs +1481 .*00000001 1512", shown)
+    assert len(re.findall(r"^(?:Outputs|Inputs|Internal) ", shown, re.MULTILINE)) == 5
     sitting.type("RESET")
     assert re.search(r"Outputs +1 00000000 ", sitting.type("SIGNAL"))
-    assert sitting.type("SIGNAL 5,99").startswith("*Illegal digital signal*")
+    assert sitting.type("SIGNAL 5,999").startswith("*Illegal digital signal*")
     assert re.search(r"Outputs +1 00000000 ", sitting.type("IO"))
 
 

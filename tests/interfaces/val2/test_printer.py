@@ -68,6 +68,7 @@ def test_programs_as_people_write_them_read_the_same(path):
         ("(a:b):inverse(c)", "a:b:INVERSE(c)"),
         ("rz(-ang):p[i+1,2]", "RZ(-ang):p[i + 1,2]"),
         ("shift(p by 1,,-3)", "SHIFT(p BY 1,, -3)"),
+        ("scale(p, 2)", "SCALE(p BY 2)"),
         ("trans(,,100)", "TRANS(,, 100)"),
         ("Here", "HERE"),
         ("random()", "RANDOM"),

@@ -98,6 +98,35 @@ def test_a_time_is_taken_back_with_its_motion() -> None:
     assert [a.values for a in rig.arm.asked if a.what == "at"] == [(4.0,), (None,)]
 
 
+def test_the_hand_moves_to_an_opening() -> None:
+    rig = Rig()
+    rig.run(body("OPEN 75", "CLOSE 20", "OPEN", "CLOSE", "CLOSEI 50", "OPENI 30", "OPENI", "CLOSEI"))
+    assert [(a.what, *a.values) for a in rig.arm.asked[1:]] == [
+        ("set_hand", 75.0), ("set_hand", 20.0), ("set_hand", True), ("set_hand", False),
+        ("actuate", 50.0), ("actuate", 30.0), ("actuate", True), ("actuate", False),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("word", ["OPEN", "CLOSE", "OPENI", "CLOSEI"])
+def test_an_opening_isnt_negative(word: str) -> None:
+    error = failure(body(f"{word} -5"))
+    assert (error.what, error.detail) == ("Illegal value", "-5: an opening is 0 mm or above")
+
+
+def test_state_of_robot_and_motion() -> None:
+    text = [
+        "TYPE STATE(1), STATE(2)",
+        "MOVE TRANS(1)",
+        "TYPE STATE(2)",
+        "WAIT STATE(2) == 2",
+        "TYPE STATE(1), STATE(2)",
+    ]
+    assert run(*text) == " 7 0\n 1\n 7 2\n"
+    assert run("MOVE TRANS(1)", "BRAKE", "TYPE STATE(2)", "MOVE NULL", "TYPE STATE(2)") == " 6\n 1\n"
+    assert run("MOVE TRANS(1)", "BREAK", "BRAKE", "TYPE STATE(2)", "DISABLE POWER", "TYPE STATE(1)") == " 2\n 2\n"
+    assert failure(body("x = STATE(4)")).detail == "STATE(4): 1 is of the robot, 2 of its motion"
+
+
 def test_a_joint_that_doesnt_exist() -> None:
     assert failure(body("DRIVE 7, 10, 50")).what == "Illegal joint number"
 

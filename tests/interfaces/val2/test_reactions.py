@@ -62,6 +62,29 @@ def test_reacti_gives_up_the_motion_under_way_and_the_next_one_is_asked_anew() -
     assert rig.when(ProgramEnded)[0][0] == pytest.approx(1.4, abs=1e-2)
 
 
+@pytest.mark.parametrize("word", ["REACT", "REACTI"])
+def test_locked_reactions_wait_for_lock_0(word: str) -> None:
+    rig = Rig()
+    rig.run(
+        body(f"{word} 1001, alarm", "LOCK 10", "WAIT.EVENT , 2", "TYPE 99", "LOCK 0", "TYPE 98") + ALARM + at(1.0)
+    )
+    assert times(rig) == [99.0, pytest.approx(2.0, abs=1e-2), 98.0]
+
+
+def test_a_lock_ends_with_the_reaction_that_it_was_said_in_and_with_the_program() -> None:
+    rig = Rig()
+    locking = ".PROGRAM first()\n LOCK 5\n TYPE 1\n.END\n"
+    more = ["REACT 1001, first", "REACT 1002, alarm", "WAIT.EVENT , 3", "LOCK 1"]
+    rig.run(body(*more) + ALARM + locking + at(1.0, (2.0, 1002)))
+    assert times(rig) == [1.0, pytest.approx(2.0, abs=1e-2)]
+    assert not rig.controller.reactions.locked
+
+
+def test_a_priority_isnt_negative() -> None:
+    with pytest.raises(ValError, match=r"^\*Illegal value\* -1: a priority is 0 or above"):
+        Rig().run(body("LOCK -1"))
+
+
 def test_a_reaction_is_done_once_or_always() -> None:
     rig = Rig()
     rig.run(body("REACT 1001, alarm", "WAIT.EVENT , 5") + ALARM + at(1.0, (2.0, 1001)))

@@ -41,12 +41,45 @@ def test_sig_of_several_is_true_if_all_are_so() -> None:
 
 
 def test_signal_turns_outputs_and_internal_signals() -> None:
-    assert run("SIGNAL 1, 32, 2001", "TYPE SIG(1,32,2001)", "SIGNAL -32", "TYPE SIG(1), SIG(32)") == " -1\n -1 0\n"
+    assert (
+        run("SIGNAL 1, 512, 2001", "TYPE SIG(1,512,2001)", "SIGNAL -512", "TYPE SIG(1), SIG(512)") == " -1\n -1 0\n"
+    )
     assert run("x = 3", "SIGNAL (x)", "SIGNAL (-x), 0", "TYPE SIG(3)") == " 0\n"
     assert run("SIGNAL 1, 2", "RESET", "TYPE SIG(1), SIG(2)") == " 0 0\n"
 
 
-@pytest.mark.parametrize("number", [1001, -1001, 33, 1033, 2033, 0.5, 1e300])
+def test_bits_turn_a_group_of_signals() -> None:
+    assert run("SIGNAL 1, 9", "BITS 2001, 4 = 10", "TYPE BITS(2001,4), SIG(2002,2004)") == " 10 -1\n"
+    assert run("SIGNAL 1", "BITS 1, 8 = ^B1010", "TYPE BITS(1,9)", "BITS 2 = 0", "TYPE BITS(1,9)") == " 10\n 8\n"
+    assert (
+        run("n = 3", "BITS n, (n - 1) = n", "TYPE BITS(1,8)", "BITS 1, 32 = 2^32-1", "TYPE SIG(32)") == " 12\n -1\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("BITS 1, 3 = 8", "*Illegal value* 8: 0 to 7 for 3 signals"),
+        ("BITS 1, 3 = 0.5", "*Illegal value* 0.5: 0 to 7 for 3 signals"),
+        ("BITS 1, 3 = -1", "*Illegal value* -1: 0 to 7 for 3 signals"),
+        ("BITS 1, 33 = 0", "*Illegal value* 33: 1 to 32 signals"),
+        ("BITS 1, 0 = 0", "*Illegal value* 0: 1 to 32 signals"),
+        ("BITS 505, 9 = 0", "*Illegal digital signal* 513; allowed: 1 to 512"),
+        ("BITS 0, 2 = 0", "*Illegal digital signal* 0; allowed: 1 to 512"),
+        ("BITS (-2), 2 = 0", "*Illegal digital signal* -2; allowed: 1 to 512"),
+        ("BITS 1009, 2 = 0", "*Illegal digital signal* 1009; allowed: 1 to 512, 2001 to 2512"),
+        ("x = BITS(505,9)", "*Illegal digital signal* 513; allowed: 1 to 512"),
+    ],
+)
+def test_groups_that_arent_there(line: str, said: str) -> None:
+    rig = Rig()
+    with pytest.raises(ValError) as raised:
+        rig.run(body("SIGNAL 1", line))
+    assert str(raised.value).startswith(said)
+    assert rig.value("SIG(1)") == -1.0
+
+
+@pytest.mark.parametrize("number", [1001, -1001, 513, 1513, 2513, 0.5, 1e300])
 def test_signals_that_cant_be_set(number: float) -> None:
     signals = Signals()
     with pytest.raises(ValError, match="Illegal digital signal"):

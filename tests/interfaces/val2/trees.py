@@ -119,7 +119,9 @@ def instructions(draw):
     row = draw(st.sampled_from([row for row in forms.INSTRUCTIONS.values() if row.name not in OTHERS]))
     match row.name:
         case "TIMER":
-            return Instruction("TIMER", (draw(numbers | st.builds(Variable, plain)), draw(expressions)))
+            return Instruction("TIMER", (draw(expressions), draw(expressions)))
+        case "BITS":
+            return Instruction("BITS", (draw(expressions), draw(optional), draw(expressions)))
         case "PARAMETER":
             return Instruction(
                 "PARAMETER", (draw(expressions),), (draw(st.sampled_from(sorted(forms.PARAMETERS))),)
