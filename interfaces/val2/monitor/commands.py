@@ -211,6 +211,9 @@ MOST: Final = 200
 _FRAGMENT: Final = re.compile(r"[#$]?[A-Za-z0-9._]*$")
 _DO: Final = re.compile(r"\sDO\s(.*)$", re.IGNORECASE | re.DOTALL)
 _LABEL: Final = re.compile(r"\s*\d+\s+")
+_OF_SETTING: Final = re.compile(r"\b(SWITCH|PARAMETER)\s*\(\s*$", re.IGNORECASE)
+_SETTINGS: Final = {"SWITCH": forms.SWITCHES, "PARAMETER": forms.PARAMETERS}
+"""What functions of names take."""
 
 
 def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Word]]:
@@ -275,6 +278,9 @@ def _motion(state: TerminalState, before: str) -> Iterable[Word]:
 
 
 def _operands(state: TerminalState, before: str) -> Iterator[Word]:
+    if named := _OF_SETTING.search(before):
+        yield from _rows(_SETTINGS[named[1].upper()])(state, before)
+        return
     yield from (Word(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
     yield from (Word(name, said) for name, said in forms.OPERATORS.items())
     yield from _names("location", "point", "real", "string")(state, before)
