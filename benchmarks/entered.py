@@ -25,6 +25,8 @@ from typing import IO
 from websockets.sync.client import connect
 
 import interfaces as vrs
+from interfaces.stream.connection import Connection
+from vrs.model import Array
 
 TRACING = Path(__file__).with_name("tracing")
 IDLE, BUSY = 1, 2
@@ -106,6 +108,19 @@ def _type(console: IO[str] | None, line: str) -> None:
     console.flush()
 
 
+def _moves(looking: Connection, rest: Array) -> None:
+    """Wait until the real robot moves away from where it rests.
+
+    Raises:
+        TimeoutError: If it doesn't in 10 s.
+    """
+    until = time.monotonic() + 10.0
+    while looking.state is None or abs(looking.state.q - rest).max() < MOVED:
+        if time.monotonic() > until:
+            raise TimeoutError("the real robot doesn't move")
+        time.sleep(0.01)
+
+
 def _starting(stack: contextlib.ExitStack, *options: str) -> tuple[Watch, str]:
     """Serve an arm whose robot is a site of its own, watched: where clients come."""
     watch = Watch(Path(stack.enter_context(tempfile.TemporaryDirectory())))
@@ -130,11 +145,11 @@ def command() -> dict[str, list[str]]:
             time.sleep(SETTLED)
         with watch.phase(IDLE):
             time.sleep(REST)
+        assert looking.state is not None
         rest = looking.state.q
         with watch.phase(BUSY):
             _type(console.stdin, "DO DRIVE 1,3,100")
-            while abs(looking.state.q - rest).max() < MOVED:
-                time.sleep(0.01)
+            _moves(looking, rest)
         return watch.modules()
 
 
@@ -157,12 +172,12 @@ def pose(delay: float = 2.0) -> dict[str, list[str]]:
             time.sleep(SETTLED + 2 * delay)
         with watch.phase(IDLE):
             time.sleep(REST)
+        assert looking.state is not None
         rest = looking.state.q
         _type(console.stdin, "DO DRIVE 1,3,100")
         time.sleep(0.75 * delay)
         with watch.phase(BUSY):
-            while abs(looking.state.q - rest).max() < MOVED:
-                time.sleep(0.01)
+            _moves(looking, rest)
             time.sleep(SETTLED)
         return watch.modules()
 

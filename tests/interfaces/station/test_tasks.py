@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from axe_core_python.sync_playwright import Axe
 
-from robots import ipr
+from robots import mobile
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import Page, paged, station
 
@@ -27,7 +27,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server(kept: Path) -> Iterator[Child]:
-    home = (Path(ipr.__file__).parent / "rooms" / "home.room").read_text()
+    home = (Path(mobile.__file__).parent / "rooms" / "home.room").read_text()
     room = kept.with_name("hall.room")
     hall = home.replace("start 1.2 5.4 0", "start 4.65 5.0 90").replace("place A 1.2 5.4 0", "place A 4.7 5.3")
     room.write_text(hall)

@@ -114,7 +114,8 @@ def test_lines_are_edited_completed_and_recalled(browser: Any, server: Child) ->
         keys.press("ArrowUp")
         shows(page, f"{TEXT}.endsWith('.listr 6*7')")
         keys.press("Control+c")
-        # An example is loaded by a click; the page takes control for it, which was free.
+        # An example is loaded by a click; the page takes control for it once a page before has lost it.
+        page.wait("station.session.lease.state === 'free'")
         page.page.select_option("#terminal-file", "05_circle")
         page.page.click("#terminal-load")
         shows(page, f"{TEXT}.includes('05_circle.v2: ')")
