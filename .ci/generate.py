@@ -9,7 +9,8 @@ import enum
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +33,13 @@ from interfaces.messages.description import (
 from interfaces.messages.fields import Party
 from interfaces.recording.channels import CHANNELS
 from interfaces.stream.codec import KINDS
+from interfaces.val2 import forms
 from interfaces.val2.monitor.commands import COMMANDS
+from interfaces.val2.rows import Form
 
 HOME = Path(__file__).resolve().parents[1]
 SCRIPT = HOME / "interfaces" / "stream" / "static" / "protocol.js"
-DOCUMENTS = HOME / "docs" / "protocol.md", HOME / "docs" / "recording.md", HOME / "docs" / "console.md"
+DOCUMENTS = tuple(HOME / "docs" / f"{name}.md" for name in ("protocol", "recording", "console", "val2"))
 COMMAND = "make generate"
 
 
@@ -348,7 +351,7 @@ def _sizes(kind: Any) -> str:
 # The documents' tables.
 
 MARKED = re.compile(
-    r"<!-- (commands|fields|messages|roles|topics|words)(?:: ([\w ./=-]+))? -->\n.*?<!-- end -->", re.S
+    r"<!-- (commands|fields|messages|roles|topics|words|language)(?:: ([\w $#./=-]+))? -->\n.*?<!-- end -->", re.S
 )
 Names = dict[str, str]
 """What a document calls what has a table of its own there, by the name of its class."""
@@ -358,7 +361,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
     """A document with its tables as the definitions have them.
 
     `fields: report.plan` is a table of what stands in a field, `fields: receipt = outcome.receipt` one with a name,
-    and `messages: order.command` one of all that may stand in a field.
+    and `messages: order.command` one of all that may stand in a field. `language: functions ABS` is a table of the
+    functions from ABS on, as far as the first one of the document's next such table.
 
     Raises:
         KeyError: If it asks for a table of something that isn't there.
@@ -374,6 +378,7 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
         return _inside(tables[first], inner) if inner else [tables[first]]
 
     names: Names = {}
+    parts_of_language = [said for what, said in MARKED.findall(text) if what == "language"]
     for what, said in MARKED.findall(text):
         name, _, path = said.rpartition(" = ")
         if what == "fields":
@@ -386,6 +391,8 @@ def document(text: str, found: Iterable[MessageDescription]) -> str:
             rows = _roles_table(known)
         elif what == "commands":
             rows = _commands_table()
+        elif what == "language":
+            rows = _language_table(name, parts_of_language)
         elif what == "words":
             rows = _words_table(choices[name])
         elif what == "fields":
@@ -427,6 +434,70 @@ def _commands_table() -> list[str]:
         marks = " +" * one.ours + " *" * (not one.idle)
         rows.append(_row(" ".join(f"`{usage}`" for usage in one.usage) + marks, one.help))
     return rows
+
+
+def _language_table(part: str, parts: list[str]) -> list[str]:
+    """A part of VAL-II's table: a kind of words, and of which the first one is where they have several tables."""
+    kind, _, first = part.partition(" ")
+    firsts = [one.partition(" ")[2] for one in parts if one.startswith(f"{kind} ")]
+    match kind:
+        case "instructions":
+            rows = _section(forms.INSTRUCTIONS, first, firsts)
+            return _forms_table(rows, "where", _place)
+        case "functions":
+            known = {name: row for name, row in forms.FUNCTIONS.items() if "idle" not in row.tags}
+            return _forms_table(_section(known, first, firsts), "gives", lambda row: GIVEN[row.gives])
+        case "switches":
+            cells = [(f"`{one.name}`", "on" if one.default else "off", one.help, one.origin)
+                     for one in forms.SWITCHES.values()]  # fmt: skip
+            return _table(("switch", "at first", "does", "from"), cells)
+        case "parameters":
+            cells = [(f"`{one.name}`", f"{one.default:g} {one.unit}", f"{one.low:g} to {one.high:g} {one.unit}",
+                      one.help, one.origin) for one in forms.PARAMETERS.values()]  # fmt: skip
+            return _table(("parameter", "at first", "range", "is", "from"), cells)
+        case "within":
+            return _table(("word", "is"), [(f"`{word}`", said) for word, said in forms.WORDS.items()])
+        case "formats":
+            return _table(("item", "does"), [(f"`/{item}`", said) for item, said in forms.FORMATS.items()])
+        case "unavailable":
+            return _table(
+                ("word", "why"), [(f"`{word}`", said) for word, said in sorted(forms.UNAVAILABLE.items())]
+            )
+        case "passed":
+            return [_listed(sorted(forms.IGNORED - forms.UNAVAILABLE.keys()))]
+        case "idle":
+            return [_listed(name for name, row in forms.FUNCTIONS.items() if "idle" in row.tags)]
+    raise KeyError(kind)
+
+
+GIVEN = {"real": "number", "truth": "number", "string": "string", "frame": "transformation", "location": "joints"}
+"""What a function of VAL-II's comes to, by what its row has."""
+
+
+def _section(known: dict[str, Form], first: str, firsts: list[str]) -> list[Form]:
+    """Rows from one on, as far as another one that a table begins with."""
+    found = dropwhile(lambda row: row is not known[first], known.values())
+    return [next(found), *takewhile(lambda row: row.name not in firsts, found)]
+
+
+def _forms_table(rows: list[Form], title: str, told: Callable[[Form], str]) -> list[str]:
+    cells = [(f"`{row.usage}`".replace("|", r"\|"), row.help.replace("|", r"\|"), told(row), row.origin)
+             for row in rows]  # fmt: skip
+    return _table(("written", "does", title, "from"), cells)
+
+
+def _place(row: Form) -> str:
+    """Where an instruction may stand: * after DO while a program runs, too."""
+    return "program" if "program" in row.tags else "program, DO" + " *" * ("beside" in row.tags)
+
+
+def _table(titles: Iterable[str], cells: Iterable[Iterable[str]]) -> list[str]:
+    head = _row(*titles)
+    return [head, re.sub("[^|]+", "---", head), *(_row(*some) for some in cells)]
+
+
+def _listed(words: Iterable[str]) -> str:
+    return ", ".join(f"`{word}`" for word in words)
 
 
 def _fields_table(name: str, message: MessageDescription, tags: dict[str, str], names: Names) -> list[str]:
@@ -589,12 +660,13 @@ def _figure(number: Any) -> str:
 def derived() -> dict[Path, str]:
     """Every file that has something derived, as it's to be."""
     found, stored = messages(), recorded()
-    protocol, recording, console = DOCUMENTS
+    protocol, recording, console, language = DOCUMENTS
     return {
         SCRIPT: script(found),
         protocol: document(protocol.read_text(encoding="utf-8"), found),
         recording: document(recording.read_text(encoding="utf-8"), stored),
         console: document(console.read_text(encoding="utf-8"), ()),
+        language: document(language.read_text(encoding="utf-8"), ()),
     }
 
 

@@ -801,9 +801,10 @@ _ROWS: Final = (
          _alteration(_correct), tags="beside"),
     Form("NOALTER", "", "Corrections of the path end.", "VAL-II",
          _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),
-    Form("ALTON", "channel?=0, mode:mode?=0", "As ALTER.", "V+", _alteration(_alter), usage="ALTON (channel) mode",
-         rule="channel"),
-    Form("ALTOFF", "", "As NOALTER.", "V+", _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
+    Form("ALTON", "channel?=0, mode:mode?=0", "Corrections of the path begin, as by ALTER.", "V+",
+         _alteration(_alter), usage="ALTON (channel) mode", rule="channel"),
+    Form("ALTOFF", "", "Corrections of the path end, as by NOALTER.", "V+",
+         _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
     # Hand.
     Form("OPEN", "opening?", "Open the hand, or to an opening [mm], with the next motion.", "VAL",
          _now(_hand_with_motion)),

@@ -198,7 +198,8 @@ def help_(state: TerminalState, rest: str) -> None:
     whole = next((some[0] for names in tables if len(some := begun(rest.upper(), names)) == 1), rest)
     found = list(explained(rest)) or list(explained(whole))
     if not found:
-        raise ValError("Unknown word", f"{_short(rest)}{_near(rest, [word for names in tables for word in names])}")
+        near = _near(rest, [word for names in tables for word in names])
+        raise ValError("Unknown word", _short(rest) + (near or "; HELP alone lists those that are allowed"))
     for one in found:
         kind = f"{one.kind}, {one.origin}" if one.origin else one.kind
         said = textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    ")
@@ -210,6 +211,9 @@ MOST: Final = 200
 _FRAGMENT: Final = re.compile(r"[#$]?[A-Za-z0-9._]*$")
 _DO: Final = re.compile(r"\sDO\s(.*)$", re.IGNORECASE | re.DOTALL)
 _LABEL: Final = re.compile(r"\s*\d+\s+")
+_OF_SETTING: Final = re.compile(r"\b(SWITCH|PARAMETER)\s*\(\s*$", re.IGNORECASE)
+_SETTINGS: Final = {"SWITCH": forms.SWITCHES, "PARAMETER": forms.PARAMETERS}
+"""What functions of names take."""
 
 
 def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tuple[str, list[Word]]:
@@ -243,29 +247,40 @@ def suggestions(text: str, state: TerminalState, *, program: bool = False) -> tu
     return fragment, [one._replace(word=one.word.lower()) if lower else one for one in some]
 
 
-def _instruction(state: TerminalState, before: str) -> Iterator[Word]:
+def _instruction(state: TerminalState, before: str, *, alone: bool = False) -> Iterator[Word]:
+    """What may come in a line of a program, or in one that stands alone."""
     word, _ = split_word(_LABEL.sub("", before))
     keyword = word.upper()
     if not word:
-        yield from _rows(forms.INSTRUCTIONS)(state, before)
+        allowed = {name: row for name, row in forms.INSTRUCTIONS.items() if not (alone and "program" in row.tags)}
+        yield from _rows(allowed)(state, before)
         yield from _names("real", "string")(state, before)
     elif keyword in {"ENABLE", "DISABLE"}:
         yield from _rows(forms.SWITCHES)(state, before)
+    elif keyword == "PARAMETER" and "=" not in before:
+        yield from _rows(forms.PARAMETERS)(state, before)
     else:
         if keyword in {"CALL", "GOSUB", "REACT", "REACTI"}:
             yield from _programs(state, before)
         if keyword in forms.INSTRUCTIONS:
-            allowed = forms.INSTRUCTIONS[keyword].allowed_words
-            yield from (Word(one, forms.WORDS.get(one, "")) for one in allowed)
+            words = forms.INSTRUCTIONS[keyword].allowed_words
+            yield from (Word(one, forms.WORDS.get(one, "")) for one in words)
         yield from _operands(state, before)
+
+
+def _statement(state: TerminalState, before: str) -> Iterable[Word]:
+    return _instruction(state, before, alone=True)
 
 
 def _motion(state: TerminalState, before: str) -> Iterable[Word]:
     found = _DO.search(before)
-    return _instruction(state, found[1]) if found else [Word("DO")]
+    return _statement(state, found[1]) if found else [Word("DO")]
 
 
 def _operands(state: TerminalState, before: str) -> Iterator[Word]:
+    if named := _OF_SETTING.search(before):
+        yield from _rows(_SETTINGS[named[1].upper()])(state, before)
+        return
     yield from (Word(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
     yield from (Word(name, said) for name, said in forms.OPERATORS.items())
     yield from _names("location", "point", "real", "string")(state, before)
@@ -350,7 +365,7 @@ _TABLE: Final = (
     MonitorCommand("DISABLE", partial(running.turn, on=False), "switch,..", "Turn switches off.",
                    completes=_SWITCHES),
     MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
-                   completes=_instruction, idle=True, short="D"),
+                   completes=_statement, idle=True, short="D"),
     MonitorCommand("DONE", lambda s, _: s.controller.finish(), "", "End the program with its present cycle."),
     MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.",
                    completes=_programs, idle=True),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -172,7 +172,7 @@ def turn(state: TerminalState, rest: str, *, on: bool) -> None:
         state.control.resume(now=state.now)
 
 
-def _matched(rest: str, known: Iterable[str], kind: str) -> list[str]:
+def _matched(rest: str, known: Collection[str], kind: str) -> list[str]:
     """The names that beginnings between commas stand for."""
     return [unique(piece.upper(), known, kind) for piece in pieces(rest)]
 

@@ -6,7 +6,7 @@ import contextlib
 import enum
 import math
 import re
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Final, TypeAlias
 
@@ -87,7 +87,7 @@ def begun(word: str, names: Iterable[str]) -> list[str]:
     return found[:1] if found and all(name.startswith(found[0]) for name in found) else found
 
 
-def unique(word: str, names: Iterable[str], kind: str) -> str:
+def unique(word: str, names: Collection[str], kind: str) -> str:
     """The name that a word is the beginning of.
 
     Args:
@@ -102,7 +102,7 @@ def unique(word: str, names: Iterable[str], kind: str) -> str:
         case [name]:
             return name
         case []:
-            raise ValError(f"Invalid {kind}", word)
+            raise ValError(f"Invalid {kind}", f"{word}; allowed: {', '.join(sorted(names))}")
         case several:
             raise ValError(f"Ambiguous {kind}", f"{word}: {', '.join(sorted(several))}")
 

@@ -79,7 +79,7 @@ def chosen(known: Mapping[str, T], rest: str, kind: str) -> dict[str, T]:
         kind: What they are, for the error.
 
     Raises:
-        ValError: If nothing is so named.
+        ValError: If nothing is so named, or can be.
     """
     if not rest:
         return dict(known)
@@ -87,6 +87,8 @@ def chosen(known: Mapping[str, T], rest: str, kind: str) -> dict[str, T]:
     for piece in pieces(rest):
         wanted = matcher(piece)
         some = {name: value for name, value in known.items() if wanted.fullmatch(name)}
+        if not (some or _PATTERN.fullmatch(piece)):
+            raise ValError("Invalid argument", f"{piece}: a name is wanted; * stands for any characters")
         if not some:
             raise ValError(f"Undefined {kind}", piece)
         found |= some
