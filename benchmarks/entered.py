@@ -14,7 +14,6 @@ import json
 import os
 import re
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -26,6 +25,7 @@ from websockets.sync.client import connect
 
 import interfaces as vrs
 from interfaces.stream.connection import Connection
+from interfaces.system import module_process
 from vrs.model import Array
 
 TRACING = Path(__file__).with_name("tracing")
@@ -48,8 +48,6 @@ class Watch:
         self.folder = folder
         self._phase = folder / "phase"
         self._phase.write_bytes(b"\0")
-        path = os.pathsep.join([str(TRACING), *(entry or os.getcwd() for entry in sys.path)])
-        self.environment = os.environ | {"VRS_ENTERED": str(folder), "PYTHONPATH": path}
 
     @contextlib.contextmanager
     def phase(self, phase: int) -> Iterator[None]:
@@ -76,9 +74,11 @@ class Watch:
 
 @contextlib.contextmanager
 def _vrs(watch: Watch, *words: str) -> Iterator[subprocess.Popen[str]]:
-    command = [sys.executable, "-P", "-m", "interfaces.cli", *words]
+    command, environment = module_process("interfaces.cli", *words)
+    environment["VRS_ENTERED"] = str(watch.folder)
+    environment["PYTHONPATH"] = os.pathsep.join((str(TRACING), environment["PYTHONPATH"]))
     with subprocess.Popen(
-        command, env=watch.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=watch.folder
+        command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=watch.folder
     ) as process:
         try:
             yield process
@@ -186,8 +186,8 @@ def recording() -> dict[str, list[str]]:
     """Modules of a recording that plays, from the file until the page's sockets have it."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        demo = [sys.executable, "-P", "-m", "interfaces.cli", "demo", "--out", str(folder)]
-        subprocess.run(demo, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        demo, environment = module_process("interfaces.cli", "demo", "--out", str(folder))
+        subprocess.run(demo, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         watch = Watch(Path(stack.enter_context(tempfile.TemporaryDirectory())))
         player = stack.enter_context(_vrs(watch, "replay", str(folder / "run.mcap"), "--port", "0"))
         address = re.search(r"http://(127\.0\.0\.1:\d+)", _said(player, "http://"))

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 import typer
 
 from interfaces.cli.options import RobotName, val_robot
-from interfaces.system import software
+from interfaces.system import module_process, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import home
@@ -163,13 +163,13 @@ def local_server(options: Sequence[str]) -> Iterator[str]:
     Raises:
         ServerStartError: If it isn't ready in time.
     """
-    command = [sys.executable, "-P", "-m", "interfaces.cli", "serve", "--port", "0", "--until-eof", *options]
+    command, environment = module_process("interfaces.cli", "serve", "--port", "0", "--until-eof", *options)
     process = subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)},
+        env=environment,
         start_new_session=True,
     )
     try:
