@@ -147,12 +147,13 @@ def test_jogging_and_dragging_change_nothing_of_what_was_shown(page: Page) -> No
         """window.said = []; new MutationObserver(() => said.push(badge.dataset.status))
         .observe(document.getElementById('badge'), { attributes: true, attributeFilter: ["data-status"] })"""
     )
-    before = page.virtual
     page.page.evaluate("document.activeElement.blur()")
-    for key in ("q", "a", "ArrowUp"):
-        page.page.keyboard.press(key, delay=700)
-    page.until(lambda: moved(page, 0.005, before))
-    page.rest()
+    for key in ("q", "PageUp", "a"):
+        before = page.virtual
+        page.page.keyboard.down(key)
+        page.until(lambda before=before: moved(page, 0.005, before))
+        page.page.keyboard.up(key)
+        page.rest()
     pane = page.page.locator("#pane").bounding_box()
     at = page.get("station.shared.drag.project(station.shared.drag.tool())")
     page.page.mouse.move(pane["x"] + at["x"], pane["y"] + at["y"])
