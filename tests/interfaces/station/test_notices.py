@@ -123,7 +123,10 @@ def test_jogging_the_tool_into_a_singularity_says_so_and_what_leads_out(page: Pa
     page.take_control().rest()
     page.page.fill("#speed", "100")
     page.page.click("[data-pose=nominal]")
-    page.wait("station.session.timeline.end > station.session.now")
+    page.wait(
+        """(() => { const { timeline, welcome } = station.session; const end = timeline.joints(timeline.end);
+        return welcome.poses.nominal.every((x, k) => Math.abs(x - end[k]) < 1e-6); })()"""
+    )
     page.rest()
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.down("PageUp")
