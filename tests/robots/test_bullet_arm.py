@@ -8,7 +8,7 @@ import pytest
 from roboticstoolbox.models.DH import Puma560
 
 from robots.bullet import Payload, Reality, WorldClosedError
-from robots.onboard import ServoGains
+from robots.onboard.servo import ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.body import RealArm
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, FLANGE, default_limits
