@@ -6,8 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import ClassVar, Final, Self
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +20,7 @@ from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.following import SensorWatch
 from robots.onboard.laser import LaserScan
+from robots.robot import Closing
 from vrs.checks import finite, integer_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
@@ -58,7 +58,7 @@ class Collision:
     """What, by its name in the room."""
 
 
-class MobileRobot(ABC):
+class MobileRobot(Closing, ABC):
     """A real mobile robot: told (v, ω), it goes on by steps of `reality.dt` and senses on the way."""
 
     _STEP: ClassVar[float]
@@ -258,18 +258,6 @@ class MobileRobot(ABC):
     def follow(self, v: float, w: float) -> None:
         """Go on by one control period; arguments and errors as of `drive`."""
         self.drive(v, w, self._period_steps)
-
-    def close(self) -> None:
-        """Give back what the robot holds; a second call does nothing."""
-        return
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @abstractmethod
     def _begin(self) -> None:

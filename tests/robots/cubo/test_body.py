@@ -58,11 +58,11 @@ def test_arms_swing_forward_and_the_head_nods() -> None:
 
 def test_what_pybullet_has_is_what_the_parameters_say() -> None:
     with CuboBody() as body:
-        bullet, client = body.world.bullet, body.world.client
-        mass = sum(bullet.getDynamicsInfo(body.body_id, j, physicsClientId=client)[0] for j in range(-1, 6))
+        bullet = body.world.bullet
+        mass = sum(bullet.getDynamicsInfo(body.body_id, j)[0] for j in range(-1, 6))
         assert mass == pytest.approx(2.0, rel=1e-6)
         for number, limb in enumerate(p.CUBO.limbs):
-            info = bullet.getDynamicsInfo(body.body_id, 3 + number, physicsClientId=client)
+            info = bullet.getDynamicsInfo(body.body_id, 3 + number)
             assert info[0] == pytest.approx(limb.mass)
             assert info[2] == pytest.approx(limb.inertia(), rel=1e-6)
             assert info[3] == pytest.approx(limb.centre, abs=1e-9)
