@@ -14,17 +14,10 @@ import numpy as np
 from msgspec import Meta, field
 from numpy.typing import ArrayLike
 
-from vrs.checks import finite, finite_array, normal, number_in, sized_array
+from vrs.checks import finite, normal, number_in, sized_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 from vrs.record import LARGEST, Number, Pose, Record, Time, Twist, Value, set_field
-
-__all__ = [
-    "Cancel", "Command", "DriveCommand", "Frame", "InsertVia", "Insertion", "JointTarget", "Lateness", "Motion",
-    "MotionCommand", "ParameterChange", "PlanEdit", "PoseTarget", "Position", "PositionQuery", "Profile", "Resume",
-    "Retime", "ScaleTime", "SteerCommand", "Stop", "Target", "finite", "finite_array",
-]  # fmt: skip
-
 
 FARTHEST = 1e6
 """Largest distance in a command [m]."""
