@@ -14,7 +14,7 @@ from typing_extensions import override
 
 from robots.base import PERIOD
 from robots.bullet.rooms import EMPTY, Room, load_room
-from robots.mobile.chassis import Chassis, MobileReality, Senses
+from robots.mobile.chassis import Chassis, MobileReality, Senses, centre_of
 from robots.mobile.drive_train import DriveTrain, Odometry, as_posture
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
@@ -346,10 +346,9 @@ class MobileRobot(Closing, ABC):
 
     def _overlap(self, posture: tuple[float, float, float]) -> str:
         """What the body's outline overlaps at a posture."""
-        x, y, theta = posture
         body = self.chassis
-        middle_x, middle_y = x + body.centre_x * math.cos(theta), y + body.centre_x * math.sin(theta)
-        return self._plan.touched(middle_x, middle_y, theta, (body.length / 2, body.width / 2), self.time)
+        x, y, theta = centre_of(posture, body.centre_x)
+        return self._plan.touched(x, y, theta, (body.length / 2, body.width / 2), self.time)
 
     def _touch(self, thing: str) -> None:
         """Note what the body touches; a touch that goes on is one collision."""
@@ -423,10 +422,9 @@ class BareBody(MobileRobot):
 
     def _look_out(self) -> None:
         """Stay where the way leads into something; or work out how long nothing can be met."""
-        x, y, theta = self._truth
         body = self.chassis
-        middle_x, middle_y = x + body.centre_x * math.cos(theta), y + body.centre_x * math.sin(theta)
-        space = self._plan.clearance(middle_x, middle_y, self.time) - body.reach
+        x, y, _ = centre_of(self._truth, body.centre_x)
+        space = self._plan.clearance(x, y, self.time) - body.reach
         if space > 0:
             self._touch("")
             # Slip and wrong wheels add a few percent to the speeds; half as much again is beyond any of them.

@@ -28,7 +28,7 @@ from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
-from vrs.mobile.model import all_wrapped
+from vrs.mobile.model import all_wrapped, placed
 from vrs.model import Array
 
 _STRAIGHT = 1e-4
@@ -205,10 +205,7 @@ class ObstacleAvoidance:
         if not heard.any():
             self._points, self._seen = points, seen
             return
-        x, y, theta = posture
-        cos, sin = math.cos(theta), math.sin(theta)
-        origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-        angles = self._mounts[:, 2] + theta
+        origins, angles = placed(self._mounts[:, :2], posture), self._mounts[:, 2] + posture[2]
         if len(points):
             stands = self._stands(points, origins[heard], angles[heard], r[heard])
             points, seen = points[stands], seen[stands]

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vrs.checks import bounded_text
 from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile.model import placed
 from vrs.model import Array, frozen_array
 
 SCHEMA: Final = "vrs-gsp-map/1"
@@ -96,12 +97,8 @@ class Lines:
 
     def moved(self, posture: tuple[float, float, float]) -> Lines:
         """The same lines as told by somebody in whose frame a robot is at a posture, if they're in the robot's."""
-        x, y, theta = posture
-        c, s = math.cos(theta), math.sin(theta)
-        places = self.poses[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
-        return Lines.of(
-            np.column_stack([places, self.poses[:, 2] + theta]), self.spans, self.variances, self.counts
-        )
+        poses = np.column_stack([placed(self.poses[:, :2], posture), self.poses[:, 2] + posture[2]])
+        return Lines.of(poses, self.spans, self.variances, self.counts)
 
 
 def injection(theta: ArrayLike) -> Array:

@@ -25,6 +25,7 @@ from robots.onboard.line_filter import evidence
 from robots.onboard.localization import LocalizationConfig, Tracker
 from robots.onboard.map_building import Surveyor
 from vrs.checks import validated, within
+from vrs.mobile.model import composed
 from vrs.model import Array, frozen_array
 
 UNKNOWN = frozen_array(np.diag([1e4, 1e4, 10.0]))
@@ -258,12 +259,6 @@ class Localizer:
         tracker.move(self.odometry.time, newest)
         tracker.noise = surveyor.noise
         self._found(tracker)
-
-
-def composed(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The posture in the world of what is at b in a frame that is at a."""
-    c, s = math.cos(a[2]), math.sin(a[2])
-    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], a[2] + b[2]
 
 
 def compounded(

@@ -27,6 +27,7 @@ from robots.onboard.avoidance import Mounts
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid
+from vrs.mobile.model import placed
 from vrs.model import Array
 
 _NEVER = -math.inf
@@ -151,10 +152,7 @@ class EnvironmentSupervisor:
         self._drop(now)
         if not self._cells and not heard.any():
             return heard
-        x, y, theta = posture
-        cos, sin = math.cos(theta), math.sin(theta)
-        origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-        angles = self._mounts[:, 2] + theta
+        origins, angles = placed(self._mounts[:, :2], posture), self._mounts[:, 2] + posture[2]
         r = np.where(heard, np.maximum(r, config.range_min), config.range_max)
         sees = heard | (self._silent >= config.silence)
         self._look_through(origins[sees], angles[sees], r[sees], now)
