@@ -116,7 +116,7 @@ class Localizer:
         """What follows the robot; None before it was ever known where that is."""
         self._surveyor: Surveyor | None = None
         self._verdicts: deque[tuple[float, bool, bool]] = deque()
-        self._looked = self._since = self._scanned = -math.inf
+        self._looked = self._since = -math.inf
         self._good = 0
         self._candidates: tuple[Candidate, ...] = ()
         self.events: deque[Event] = deque(maxlen=_KEPT_EVENTS)
@@ -166,9 +166,8 @@ class Localizer:
 
     def see(self, scan: LaserScan) -> bool:
         """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
-        if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
+        if not self.odometry.takes(scan):
             return False
-        self._scanned = scan.time
         tracker, surveyor = self.tracker, self._surveyor
         if tracker is not None:
             tracker.see(scan)
