@@ -36,9 +36,9 @@ def circle(body: MobileRobot) -> None:
 
 def bare_steps(body: MobileBody, count: int) -> None:
     """Step a robot's world without anything around it."""
-    step, client = body.world.bullet.stepSimulation, body.world.client
+    step = body.world.bullet.stepSimulation
     for _ in range(count):
-        step(physicsClientId=client)
+        step()
 
 
 def measure(blocks: int = 40) -> dict[str, float]:

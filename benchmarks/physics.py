@@ -36,11 +36,11 @@ def references(steps: int, *, speed: float = 0.9, dt: float = 1e-3) -> tuple[Arr
 
 def bare_loop(world: World, body: int, torques: Array) -> None:
     """Set torques, step, read the joints: the least that any PyBullet arm does."""
-    bullet, client, joints = world.bullet, world.client, tuple(range(6))
+    bullet, joints = world.bullet, tuple(range(6))
     for tau in torques.tolist():
-        bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=tau, physicsClientId=client)
-        bullet.stepSimulation(physicsClientId=client)
-        bullet.getJointStates(body, joints, physicsClientId=client)
+        bullet.setJointMotorControlArray(body, joints, bullet.TORQUE_CONTROL, forces=tau)
+        bullet.stepSimulation()
+        bullet.getJointStates(body, joints)
 
 
 def measure(blocks: int = 20) -> dict[str, float]:

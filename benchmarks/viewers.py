@@ -26,7 +26,7 @@ from interfaces.stream.limits import ClientLimits
 from interfaces.stream.server import HubServer, application
 from interfaces.stream.sockets import KERNEL_BUFFER, bind, serve
 from robots import puma560
-from robots.onboard import Lease
+from robots.onboard.lease import Lease
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.clock import WallClock
 

@@ -16,7 +16,7 @@ from interfaces.stream.hub import Hub
 from interfaces.stream.server import HubServer, application
 from interfaces.stream.sockets import bind, serve
 from robots import puma560
-from robots.onboard import Ended, Grant, Lease
+from robots.onboard.lease import Ended, Grant, Lease
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, WallClock
 
 model = puma560.model()

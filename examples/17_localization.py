@@ -12,7 +12,8 @@ from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.floor_plan import plan_map
 from robots.mobile.robot import BareBody
-from robots.onboard import LaserModel, Localizer, Status
+from robots.onboard.laser import LaserModel
+from robots.onboard.localizer import Localizer, Status
 
 room = apartment(7, ApartmentConfig(rooms=3, people=2))
 worn = MobileReality(radius_error=(0.01, -0.01), slip_spread=0.01, dt=1 / 60)

@@ -6,7 +6,8 @@ import math
 
 from interfaces.lab.tipsuwan.run import leg, no_delay, run
 from interfaces.middleware import GainSchedulingMiddleware, MiddlewareConfig, default_network
-from robots.onboard import QuadraticCurveTracker, QuadraticTrackerConfig, read_curve
+from robots.onboard.curve import read_curve
+from robots.onboard.curve_trackers import QuadraticCurveTracker, QuadraticTrackerConfig
 
 curve = read_curve("""
 path 1

@@ -9,9 +9,9 @@ from robots.mobile.chassis import Senses
 from robots.mobile.navigation import BodyNavigator
 from robots.mobile.position import LaserPosition
 from robots.mobile.robot import BareBody, place
-from robots.onboard import Goal, LaserModel
 from robots.onboard.driving import IPR_LIMITS, STAND, kept
-from robots.onboard.journey import GOING
+from robots.onboard.journey import GOING, Goal
+from robots.onboard.laser import LaserModel
 
 PERIOD = 0.05
 home = place("home")

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from math import cos, hypot, sin
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
 from robots.solids import Builder, LinkShape, hull
-from vrs.checks import finite
-from vrs.errors import InvalidValueError
+from vrs.checks import positive, validated
 from vrs.mobile import DriveLimits, Wheels
 from vrs.model import Array
 
@@ -42,19 +41,16 @@ class Footprint:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class MobileBase:
     """A mobile robot; satisfies `vrs.mobile.MobileModel`."""
 
     limits: DriveLimits
     wheels: Wheels
     body: Footprint
-    period: float
+    period: Annotated[float, positive("positive seconds")]
     """T: time between commands [s], positive."""
     name: str
-
-    def __post_init__(self) -> None:
-        if finite("period", self.period, "positive seconds") <= 0:
-            raise InvalidValueError("period", self.period, "positive seconds")
 
     @property
     def radius(self) -> float:

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,19 @@ IDEAL: Final = "ideal"
 EXACT: Final = "exact"
 """The same by the name that it had before."""
 _FILES: Final = frozenset((".urdf", ".xacro", ".xml", ".mjcf"))
+
+
+class Closing:
+    """What is closed when its context ends."""
+
+    def close(self) -> None:
+        """Give back what it holds; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class Prepared(NamedTuple):

@@ -19,7 +19,7 @@ OURS = ("vrs", "robots", "interfaces")
 STRANGE = {"examples", "tests", "benchmarks"}
 # fmt: off
 ORDER = (
-    "vrs", "vrs.testing",
+    "vrs",
     # The robots.
     "robots.solids", "robots.base", "robots.robot", "robots.bullet", "robots.onboard", "robots.mobile",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",

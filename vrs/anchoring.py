@@ -12,11 +12,11 @@ import numpy as np
 
 from vrs.commands import Profile
 from vrs.errors import InvalidValueError
-from vrs.insertion import hold, piece, shifted
+from vrs.insertion import hold, piece
 from vrs.model import Array, Limits
 from vrs.pacing import as_plan, remainder, rest_after, segment_at
 from vrs.planning import move, violation
-from vrs.segment import HOLD, Piece, State
+from vrs.segment import HOLD, Piece, State, shifted
 from vrs.timeline import Timeline
 
 _SPANS = tuple(np.geomspace(0.1, 20.0, 24).tolist())

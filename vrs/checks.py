@@ -8,6 +8,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import fields
+from enum import StrEnum
 from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
@@ -21,6 +22,7 @@ from vrs.model import Array, frozen_array
 from vrs.record import LARGEST
 
 _ClassT = TypeVar("_ClassT", bound=type)
+_WordT = TypeVar("_WordT", bound=StrEnum)
 _Converters: TypeAlias = tuple[tuple[str, Callable[[object], object]], ...]
 
 SMALLEST = sys.float_info.min
@@ -153,6 +155,20 @@ def closest(given: str, words: Iterable[str]) -> str:
     return next((folded[one] for one in difflib.get_close_matches(given.casefold(), folded, n=1, cutoff=0.65)), "")
 
 
+def word(name: str, value: Any, kind: type[_WordT]) -> _WordT:
+    """Return the member of an enumeration that a value is or names.
+
+    Args:
+        name: What it's called, for the message.
+        value: To be checked.
+        kind: The enumeration.
+
+    Raises:
+        InvalidValueError: If it names none.
+    """
+    return kind(one_of(name, value, kind))
+
+
 def within(low: float, high: float, unit: str = "") -> msgspec.Meta:
     """Return a range that stands in the annotation of a field.
 
@@ -189,9 +205,9 @@ def validated(cls: _ClassT) -> _ClassT:
     """Check the fields of a dataclass by their annotations when one is made; stands below `@dataclass`.
 
     A field with a range (`within`, `positive`, `at_least`) is a number in it, kept as a float, or an integer where
-    the annotation says so; one with a least and a most length has as many elements; a `bool` is True or False; None
-    passes where the annotation admits it. The class's own `__post_init__` follows. What is not allowed raises
-    InvalidValueError.
+    the annotation says so; one with a least and a most length has as many elements; a `bool` is True or False; an
+    enumeration's member may be named by its text; None passes where the annotation admits it. The class's own
+    `__post_init__` follows. What is not allowed raises InvalidValueError.
 
     Args:
         cls: The class, its fields annotated.
@@ -241,6 +257,8 @@ def _converter(name: str, hint: object) -> Callable[[object], object] | None:
     optional = kinds != [hint]
     if kinds == [bool]:
         return functools.partial(_boolean, name)
+    if isinstance(hint, type) and issubclass(hint, StrEnum):
+        return functools.partial(word, name, kind=hint)
     if len(kinds) != 1 or get_origin(kinds[0]) is not Annotated:
         return None
     base, *notes = get_args(kinds[0])
@@ -271,6 +289,9 @@ def _in_range(name: str, kind: type, note: msgspec.Meta, optional: bool, value: 
     assert low is not None, name
     assert high is not None, name
     if kind is int:
+        step = note.multiple_of or 1
+        if step != 1 and (not isinstance(value, int) or value % step):
+            raise InvalidValueError(name, value, f"a multiple of {step} in [{low}, {high}]")
         return integer_in(name, value, int(low), int(high))
     unit = (note.extra or {}).get("unit", "")
     return number_in(name, value, low, high, unit=unit and f" {unit}")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, TypeAlias, TypeVar, overload
+from typing import Annotated, Any, Final, Generic, TypeAlias, TypeVar
 
 import msgspec
 
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile.timeline import ArcTimeline
-from vrs.model import Array, frozen_array
+from vrs.model import frozen_array
 from vrs.segment import ArcSegment, PolynomialSegment, Segment
 from vrs.timeline import Timeline
 
@@ -20,6 +20,7 @@ SCHEMA_VERSION = 1
 _Row = Annotated[list[float], msgspec.Meta(min_length=1, max_length=64)]
 AnyTimeline: TypeAlias = Timeline | ArcTimeline
 _KindT = TypeVar("_KindT", Timeline, ArcTimeline)
+_SegmentT = TypeVar("_SegmentT")
 
 
 class PolynomialWire(msgspec.Struct, tag="polynomial", tag_field="type", forbid_unknown_fields=True, frozen=True):
@@ -45,7 +46,7 @@ class ArcWire(msgspec.Struct, tag="arc", tag_field="type", forbid_unknown_fields
 SegmentWire = PolynomialWire | ArcWire
 
 
-class TimelineWire(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class TimelineWire(msgspec.Struct, Generic[_SegmentT], forbid_unknown_fields=True, frozen=True):
     """A timeline as it's written."""
 
     schema: str
@@ -53,44 +54,22 @@ class TimelineWire(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     version: int
     start: float
     initial: _Row
-    segments: list[PolynomialWire]
+    segments: list[_SegmentT]
 
 
-class ArcTimelineWire(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A timeline of arcs as it's written."""
-
-    schema: str
-    schema_version: int
-    version: int
-    start: float
-    initial: tuple[float, float, float]
-    segments: list[ArcWire]
-
-
-def _rows(a: Array) -> list[list[float]]:
-    rows: list[list[float]] = a.tolist()
-    return rows
-
-
-def arc_to_wire(arc: ArcSegment) -> ArcWire:
-    """The wire form of an arc."""
-    return ArcWire(arc.start, arc.duration, arc.posture, arc.v, arc.w, arc.command_id)
-
-
-def arc_from_wire(wire: ArcWire) -> ArcSegment:
-    """The arc that a wire form stands for.
-
-    Raises:
-        InvalidValueError: If it's none.
-    """
-    return ArcSegment(wire.start, wire.duration, wire.posture, wire.v, wire.w, wire.command_id)
+_FORMS: Final[dict[Any, tuple[str, Any]]] = {
+    Timeline: (SCHEMA, TimelineWire[PolynomialWire]),
+    ArcTimeline: (ARC_SCHEMA, TimelineWire[ArcWire]),
+}
+"""Schema and form of each kind of timeline."""
 
 
 def segment_to_wire(segment: Segment) -> SegmentWire:
     """The wire form of a segment."""
     if isinstance(segment, ArcSegment):
-        return arc_to_wire(segment)
-    return PolynomialWire(segment.start, segment.duration, _rows(segment.coefficients), segment.command_id)
+        return ArcWire(segment.start, segment.duration, segment.posture, segment.v, segment.w, segment.command_id)
+    rows = segment.coefficients.tolist()
+    return PolynomialWire(segment.start, segment.duration, rows, segment.command_id)
 
 
 def segment_from_wire(wire: SegmentWire) -> Segment:
@@ -100,25 +79,20 @@ def segment_from_wire(wire: SegmentWire) -> Segment:
         FormatError: If it's none.
     """
     try:
-        return arc_from_wire(wire) if isinstance(wire, ArcWire) else _polynomial(wire)
+        if isinstance(wire, ArcWire):
+            return ArcSegment(wire.start, wire.duration, wire.posture, wire.v, wire.w, wire.command_id)
+        if len({len(row) for row in wire.coefficients}) != 1:
+            raise FormatError("segment", "its coefficients must be rows of one length")
+        return PolynomialSegment(wire.start, wire.duration, frozen_array(wire.coefficients), wire.command_id)
     except InvalidValueError as error:
         raise FormatError("segment", str(error)) from None
 
 
-def _polynomial(wire: PolynomialWire) -> PolynomialSegment:
-    if len({len(row) for row in wire.coefficients}) != 1:
-        raise FormatError("segment", "its coefficients must be rows of one length")
-    return PolynomialSegment(wire.start, wire.duration, frozen_array(wire.coefficients), wire.command_id)
-
-
-def _to_wire(timeline: AnyTimeline) -> TimelineWire | ArcTimelineWire:
-    if isinstance(timeline, ArcTimeline):
-        x, y, theta = timeline.initial.tolist()
-        arcs = [arc_to_wire(arc) for arc in timeline.segments]
-        return ArcTimelineWire(ARC_SCHEMA, SCHEMA_VERSION, timeline.version, timeline.start, (x, y, theta), arcs)
-    segments = [PolynomialWire(s.start, s.duration, _rows(s.coefficients), s.command_id) for s in timeline.segments]
+def _to_wire(timeline: AnyTimeline) -> TimelineWire[SegmentWire]:
+    schema, _ = _FORMS[type(timeline)]
+    segments = [segment_to_wire(segment) for segment in timeline.segments]
     initial: list[float] = timeline.initial.tolist()
-    return TimelineWire(SCHEMA, SCHEMA_VERSION, timeline.version, timeline.start, initial, segments)
+    return TimelineWire(schema, SCHEMA_VERSION, timeline.version, timeline.start, initial, segments)
 
 
 def to_json(timeline: AnyTimeline) -> bytes:
@@ -131,11 +105,7 @@ def to_msgpack(timeline: AnyTimeline) -> bytes:
     return msgspec.msgpack.encode(_to_wire(timeline))
 
 
-@overload
-def from_json(data: bytes) -> Timeline: ...
-@overload
-def from_json(data: bytes, kind: type[_KindT]) -> _KindT: ...
-def from_json(data: bytes, kind: Any = Timeline) -> Any:
+def from_json(data: bytes, kind: type[_KindT] = Timeline) -> _KindT:  # type: ignore[assignment]
     """Read a timeline that `to_json` wrote.
 
     Args:
@@ -148,32 +118,18 @@ def from_json(data: bytes, kind: Any = Timeline) -> Any:
     return _read(data, msgspec.json.decode, kind)
 
 
-@overload
-def from_msgpack(data: bytes) -> Timeline: ...
-@overload
-def from_msgpack(data: bytes, kind: type[_KindT]) -> _KindT: ...
-def from_msgpack(data: bytes, kind: Any = Timeline) -> Any:
-    """Read a timeline that `to_msgpack` wrote.
-
-    Args:
-        data: The document.
-        kind: `Timeline`, or `ArcTimeline`.
-
-    Raises:
-        FormatError: If the bytes are anything else.
-    """
+def from_msgpack(data: bytes, kind: type[_KindT] = Timeline) -> _KindT:  # type: ignore[assignment]
+    """Read a timeline that `to_msgpack` wrote; see `from_json`."""
     return _read(data, msgspec.msgpack.decode, kind)
 
 
 def _read(data: bytes, decode: Callable[..., Any], kind: Any) -> Any:
-    of_arcs = issubclass(kind, ArcTimeline)
-    form, schema = (ArcTimelineWire, ARC_SCHEMA) if of_arcs else (TimelineWire, SCHEMA)
+    schema, form = _FORMS[kind]
     try:
         wire = decode(data, type=form)
         if (wire.schema, wire.schema_version) != (schema, SCHEMA_VERSION):
             found = f"{wire.schema} {wire.schema_version}"
             raise FormatError("timeline", f"must be of schema {schema} {SCHEMA_VERSION}, not {found}")
-        make: Callable[[Any], Segment] = arc_from_wire if of_arcs else _polynomial
-        return kind(wire.initial, wire.start, [make(one) for one in wire.segments], wire.version)
+        return kind(wire.initial, wire.start, [segment_from_wire(one) for one in wire.segments], wire.version)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, InvalidValueError) as error:
         raise FormatError("timeline", str(error)) from None

@@ -8,23 +8,16 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from msgspec import Meta, field
 from numpy.typing import ArrayLike
 
-from vrs.checks import finite, finite_array, normal, number_in, sized_array
+from vrs.checks import finite, normal, number_in, sized_array, word
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 from vrs.record import LARGEST, Number, Pose, Record, Time, Twist, Value, set_field
-
-__all__ = [
-    "Cancel", "Command", "DriveCommand", "Frame", "InsertVia", "Insertion", "JointTarget", "Lateness", "Motion",
-    "MotionCommand", "ParameterChange", "PlanEdit", "PoseTarget", "Position", "PositionQuery", "Profile", "Resume",
-    "Retime", "ScaleTime", "SteerCommand", "Stop", "Target", "finite", "finite_array",
-]  # fmt: skip
-
 
 FARTHEST = 1e6
 """Largest distance in a command [m]."""
@@ -100,9 +93,6 @@ class Frame(enum.StrEnum):
     """The robot's base frame."""
     TOOL = "tool"
     """The frame of the last link."""
-
-
-_Kind = TypeVar("_Kind", bound=enum.StrEnum)
 
 
 class JointTarget(Record, frozen=True, omit_defaults=True, gc=False, eq=False, tag_field="type", tag="joints"):
@@ -206,7 +196,7 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
         if self.tool is not None:
             set_field(self, "tool", _transform("tool", self.tool))
         for name, kind in (("motion", Motion), ("profile", Profile), ("insertion", Insertion)):
-            set_field(self, name, _word(name, getattr(self, name), kind))
+            set_field(self, name, word(name, getattr(self, name), kind))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, MotionCommand) and self._values() == other._values()
@@ -280,7 +270,7 @@ class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="ste
             set_field(self, "rates", _joints("rates", self.rates, "finite joint rates [rad/s], shape (n,)"))
         if self.twist is not None:
             set_field(self, "twist", sized_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
-        set_field(self, "frame", _word("frame", self.frame, Frame))
+        set_field(self, "frame", word("frame", self.frame, Frame))
         _check_stamps(self)
 
 
@@ -398,15 +388,6 @@ def _transform(name: str, value: ArrayLike) -> Array:
     if not proper or not np.array_equal(array[3], (0.0, 0.0, 0.0, 1.0)):
         raise InvalidValueError(name, value, allowed)
     return array
-
-
-def _word(name: str, value: object, kind: type[_Kind]) -> _Kind:
-    if isinstance(value, kind):
-        return value
-    try:
-        return kind(value)  # type: ignore[arg-type]
-    except ValueError:
-        raise InvalidValueError(name, value, f"one of {', '.join(str(item) for item in kind)}") from None
 
 
 def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdit) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vrs.archive import Keeper
-from vrs.checks import finite, finite_array
+from vrs.checks import finite, finite_array, word
 from vrs.clock import Clock
 from vrs.commands import (
     Cancel,
@@ -129,7 +129,7 @@ class Engine:
         self.clock = clock
         """The clock, None when offline."""
         ledger: Ledger[Timeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self.scheduler = Scheduler(model, timeline, ledger, lateness_of(lateness))
+        self.scheduler = Scheduler(model, timeline, ledger, word("lateness", lateness, Lateness))
         """Plans the commands."""
         self._keeper = Keeper()
 
@@ -335,7 +335,7 @@ class Engine:
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self.scheduler
         if change.name == "lateness":
-            plan.lateness = lateness_of(change.value)
+            plan.lateness = word("lateness", change.value, Lateness)
             return
         if change.name not in self._limit_names:
             raise InvalidValueError("parameter", change.name, f"one of {', '.join(self.parameters)}")
@@ -406,7 +406,7 @@ class MobileEngine(Engine):
         self.model = model
         self.clock = clock
         ledger: Ledger[ArcTimeline] = Ledger(max(timeline.owners(0, len(timeline)), default=0))
-        self.scheduler = DriveScheduler(model, timeline, ledger, lateness_of(lateness))
+        self.scheduler = DriveScheduler(model, timeline, ledger, word("lateness", lateness, Lateness))
         """Plans the commands."""
         self._keeper = Keeper()
 
@@ -501,18 +501,6 @@ class MobileEngine(Engine):
             InvalidValueError: Always.
         """
         raise InvalidValueError("correction", truth, f"made by a PostureEstimator for {self.model.name}")
-
-
-def lateness_of(value: object) -> Lateness:
-    """The lateness policy that a value names.
-
-    Raises:
-        InvalidValueError: If it names none.
-    """
-    try:
-        return Lateness(value)  # type: ignore[arg-type]
-    except ValueError:
-        raise InvalidValueError("lateness", value, f"one of {', '.join(Lateness)}") from None
 
 
 def _pose(x: float, y: float, theta: float) -> list[list[float]]:

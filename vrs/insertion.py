@@ -6,7 +6,7 @@ A scheduled move gets another time or another way, or is taken out, by the same 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import comb, inf
+from math import inf
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from vrs.model import Array
 from vrs.notes import Notes
 from vrs.planning import Plan, empty
 from vrs.planning.plan import end_state, stacked
-from vrs.segment import HOLD, Packed, Piece, State
+from vrs.segment import HOLD, Packed, Piece, State, shifted
 from vrs.timeline import BaseTimeline, Timeline
 
 MovePlanner = Callable[[State], tuple[Plan, Array, Notes]]
@@ -286,15 +286,6 @@ def _goes_on(coefficients: Array, late: float, other: Array) -> bool:
     if coefficients.shape != other.shape or np.abs(coefficients[-1] - other[-1]).max() > _SAME:
         return False
     return bool(np.abs(shifted(coefficients, late) - other).max() <= _SAME)
-
-
-def shifted(coefficients: Array, u: float) -> Array:
-    """Coefficients (K, n) in powers of the time since u [s] after their own start."""
-    K = len(coefficients)
-    M = [[comb(j, k) * u ** (j - k) if j >= k else 0.0 for j in range(K)] for k in range(K)]
-    moved: Array = np.array(M) @ coefficients
-    moved.flags.writeable = False
-    return moved
 
 
 def hold(duration: float, q: Array) -> Piece:

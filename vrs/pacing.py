@@ -14,12 +14,12 @@ from math import comb
 
 import numpy as np
 
-from vrs.insertion import piece, shifted
+from vrs.insertion import piece
 from vrs.model import Array, Limits
 from vrs.planning.certificate import violation
 from vrs.planning.fit import fit
 from vrs.planning.plan import Plan, stacked
-from vrs.segment import HOLD, Piece, evaluate
+from vrs.segment import HOLD, Piece, evaluate, shifted
 from vrs.timeline import Timeline
 
 _RAMPS = np.geomspace(0.01, 40.0, 60)

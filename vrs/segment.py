@@ -298,6 +298,15 @@ def evaluate(coefficients: Array, u: Array | float, derivative: int) -> Array:
     return value
 
 
+def shifted(coefficients: Array, u: float) -> Array:
+    """Coefficients (K, n) in powers of the time since u [s] after their own start."""
+    K = len(coefficients)
+    M = [[math.comb(j, k) * u ** (j - k) if j >= k else 0.0 for j in range(K)] for k in range(K)]
+    moved: Array = np.array(M) @ coefficients
+    moved.flags.writeable = False
+    return moved
+
+
 HOLD = 0
 """Command id, inside, of a hold; `PolynomialSegment.command_id` says None."""
 

@@ -16,7 +16,7 @@ from typing import Any, Generic, Self, TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vrs.commands import finite, finite_array
+from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
 from vrs.evaluation import Places, places_of, sample_many
 from vrs.model import Array

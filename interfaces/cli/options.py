@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
-    from robots.onboard import LossPolicy
+    from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
 
 PROFILES = (

@@ -225,7 +225,7 @@ def robot(
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.runtime.live.robot import LiveRobot
-    from robots.onboard import LossPolicy, WatchdogConfig
+    from robots.onboard.watchdog import LossPolicy, WatchdogConfig
 
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")

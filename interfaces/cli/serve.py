@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
     from robots.bullet.rooms import Room
-    from robots.onboard import LossPolicy
+    from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
 
 
@@ -162,7 +162,7 @@ def serve(
     from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.teleop.architectures import architecture as makes
-    from robots.onboard import LossPolicy
+    from robots.onboard.watchdog import LossPolicy
 
     robot = load(name)
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))

@@ -13,7 +13,8 @@ from interfaces.clients.observer import Observation, Observer
 from interfaces.clients.ports import Asking, RemotePort, port_to
 from interfaces.engine_server.site import earliest
 from interfaces.messages import Order, Outcome, RefusalCode, Reply
-from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop, finite
+from vrs.checks import finite
+from vrs.commands import Command, DriveCommand, MotionCommand, PlanEdit, PositionQuery, SteerCommand, Stop
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt, Status

@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from interfaces.clients.ports import Asking, RemotePort
 from interfaces.messages import Answer, Ask, Frame, FrameStatus, Reply
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.engine import Engine
 from vrs.errors import NonFiniteTimeError
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import InvalidValueError
 
 FASTEST = 10.0

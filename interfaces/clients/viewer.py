@@ -15,7 +15,7 @@ from interfaces.clients.viewer_sources import FrameSource, SegmentSource
 from interfaces.engine_server.forecasts import WINDOW
 from interfaces.engine_server.site import earliest
 from interfaces.messages import FrameStatus, Reply, Scene, ViewForm
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError
 from vrs.model import Array

@@ -13,7 +13,7 @@ from interfaces.engine_server.forecasts import WINDOW, Forecasts
 from interfaces.engine_server.journal import Journal
 from interfaces.messages import Broadcast, Compact, Frame, FrameStatus, FrameVerdict, Verdicts
 from interfaces.messages.compact import MOST_FRAMES, CompactEncoder, CompactFrame, packed
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError
 from vrs.model import frozen_array

@@ -10,8 +10,8 @@ from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal
 from interfaces.engine_server.servlet import Servlet
 from interfaces.messages import Order, Refusal, control
+from vrs.checks import finite
 from vrs.clock import ManualClock
-from vrs.commands import finite
 from vrs.engine import Engine
 
 

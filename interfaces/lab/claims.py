@@ -8,8 +8,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, TypeAlias
 
 from interfaces.lab.statistics import Estimate
-from vrs.checks import validated, within
-from vrs.commands import finite
+from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 
 OWN_BAR = "our own bar"

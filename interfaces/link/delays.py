@@ -18,8 +18,7 @@ from typing import Annotated, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.system import read_within
-from vrs.checks import did_you_mean, number_in, validated, within
-from vrs.commands import finite
+from vrs.checks import did_you_mean, finite, number_in, validated, within
 from vrs.errors import FormatError, InvalidValueError
 
 MAX_DELAY = 3600.0

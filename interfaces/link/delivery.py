@@ -10,7 +10,8 @@ from itertools import islice
 from typing import Generic, TypeVar
 
 from interfaces.messages import Order, Outcome
-from vrs.commands import Stop, finite
+from vrs.checks import finite
+from vrs.commands import Stop
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")

@@ -13,8 +13,7 @@ import numpy as np
 from interfaces.link.conditions import MAX_COUNT, Conditions, LinkConditions, LinkPath, Service
 from interfaces.link.delays import DelayProfile
 from interfaces.link.packets import MAX_RECORDS, LossReason, PacketLog, PacketRecord
-from vrs.checks import integer_in
-from vrs.commands import finite
+from vrs.checks import finite, integer_in
 from vrs.errors import InvalidValueError
 
 T = TypeVar("T")

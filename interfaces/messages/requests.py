@@ -32,7 +32,8 @@ from interfaces.messages.fields import (
     Word,
 )
 from interfaces.messages.segments import Dof, Segmented, Segments
-from vrs.commands import Command, finite
+from vrs.checks import finite
+from vrs.commands import Command
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array

@@ -16,7 +16,7 @@ from interfaces.recording.kinds import ARM
 from interfaces.recording.marks import Mark, MarkReader
 from interfaces.recording.recording import Recording, check_alike
 from interfaces.stream.meshcat.committed import Committed
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 

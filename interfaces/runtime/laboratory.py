@@ -18,7 +18,7 @@ from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_arm import VirtualArm
 from robots.onboard.playout import PlayState
 from robots.robot import ArmBody
-from vrs.commands import finite
+from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array

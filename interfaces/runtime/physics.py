@@ -35,9 +35,8 @@ from interfaces.runtime.physics_messages import (
 from interfaces.system import module_process
 from interfaces.teleop import JointReference, RobotHost
 from robots.robot import IDEAL, Robot
-from vrs.checks import number_in, validated, within
+from vrs.checks import finite_array, number_in, validated, within
 from vrs.clock import WallClock
-from vrs.commands import finite_array
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 

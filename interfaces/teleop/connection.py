@@ -26,7 +26,7 @@ from interfaces.link.round_trip import Echo, ProbeConfig, RoundTrip, RoundTripEs
 from interfaces.messages.control import Ping, Pong
 from interfaces.teleop.operator import OperatorSite, R, V_co
 from interfaces.teleop.robot import O, RobotSite
-from robots.onboard import LossPolicy, WatchdogConfig
+from robots.onboard.watchdog import LossPolicy, WatchdogConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 

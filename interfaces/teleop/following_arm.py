@@ -29,9 +29,9 @@ from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
 from robots.onboard.servo import from_commanded
 from robots.onboard.watchdog import StopReason, WatchdogConfig
-from vrs.checks import validated, within
+from vrs.checks import finite, validated, within
 from vrs.clock import ManualClock
-from vrs.commands import Profile, finite
+from vrs.commands import Profile
 from vrs.engine import Engine
 from vrs.errors import VrsError
 from vrs.insertion import hold, piece

@@ -17,9 +17,9 @@ from interfaces.teleop.architectures import ArchitectureRobotSite, TimelineContr
 from interfaces.teleop.autonomy import Autonomy
 from interfaces.teleop.connection import Host
 from interfaces.teleop.robot import LOST, RobotSite
-from robots.onboard import StopReason, WatchdogConfig
 from robots.onboard.driving import STAND, Drive, Posture, is_still, kept
 from robots.onboard.following import PositionSource, SoundPosition
+from robots.onboard.watchdog import StopReason, WatchdogConfig
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits
 from vrs.mobile.model import braking

@@ -211,22 +211,6 @@ class Door(Record, frozen=True, omit_defaults=True, gc=False):
         return fastest * self.length * (1.0 if self.sliding else abs(self.swing))
 
 
-__all__ = [
-    "EMPTY",
-    "MOST_BYTES",
-    "MOST_POINTS",
-    "MOST_THINGS",
-    "VERSION",
-    "Block",
-    "Column",
-    "Door",
-    "Person",
-    "Place",
-    "Room",
-    "load_room",
-    "read_room",
-]
-
 VERSION = 1
 """Of the format."""
 MOST_BYTES = 262_144

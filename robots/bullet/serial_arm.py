@@ -86,7 +86,7 @@ def load_arm(world: World, links: Sequence[RigidLink]) -> int:
     Returns:
         PyBullet's body id.
     """
-    bullet, client, n = world.bullet, world.client, len(links)
+    bullet, n = world.bullet, len(links)
     positions: list[list[float]] = [[0.0, 0.0, 0.0]]
     turns: list[list[float]] = [[0.0, 0.0, 0.0, 1.0]]
     centres, axes, diagonals = [], [], []
@@ -112,28 +112,17 @@ def load_arm(world: World, links: Sequence[RigidLink]) -> int:
         linkParentIndices=list(range(n)),
         linkJointTypes=[bullet.JOINT_REVOLUTE] * n,
         linkJointAxis=[[0.0, 0.0, 1.0]] * n,
-        physicsClientId=client,
     )
     # Damping first, mass and inertia after it, and all before the first inverse-dynamics or mass-matrix call:
     # PyBullet caches the tree that answers those and never looks at the masses again.
     for j in range(n):
         bullet.changeDynamics(
-            body,
-            j,
-            linearDamping=0.0,
-            angularDamping=0.0,
-            jointDamping=0.0,
-            maxJointVelocity=_FREE_SPEED,
-            physicsClientId=client,
+            body, j, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, maxJointVelocity=_FREE_SPEED
         )
-    bullet.changeDynamics(
-        body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client
-    )
+    bullet.changeDynamics(body, -1, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING)
     for j, link in enumerate(links):
-        bullet.changeDynamics(body, j, mass=link.mass, localInertiaDiagonal=diagonals[j], physicsClientId=client)
-    bullet.setJointMotorControlArray(
-        body, list(range(n)), bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=client
-    )
+        bullet.changeDynamics(body, j, mass=link.mass, localInertiaDiagonal=diagonals[j])
+    bullet.setJointMotorControlArray(body, list(range(n)), bullet.VELOCITY_CONTROL, forces=[0.0] * n)
     return int(body)
 
 

@@ -10,13 +10,16 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType, TracebackType
-from typing import Any, Final, Self
+from functools import partial
+from types import ModuleType
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from robots.bullet.rooms import Block, Column, Room
+from robots.robot import Closing
 from robots.solids import LinkShape
 from vrs.errors import VrsError
 from vrs.model import Array
@@ -53,19 +56,34 @@ def load_pybullet() -> Any:
     return pybullet
 
 
-class World:
+class Client:
+    """PyBullet's functions and constants, each function of one world alone."""
+
+    def __init__(self, number: int) -> None:
+        """Take PyBullet's id of the world."""
+        self._number = number
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(load_pybullet(), name)
+        if callable(found):
+            found = partial(found, physicsClientId=self._number)
+        setattr(self, name, found)
+        return found
+
+
+class World(Closing):
     """A PyBullet client, empty but for gravity and a time step. Several live side by side in a process."""
 
     def __init__(self, *, gravity: float, dt: float) -> None:
         """Connect a client with free fall along -z [m/s²] and a fixed step [s]."""
-        self.bullet = load_pybullet()
+        bullet = load_pybullet()
         self._gravity, self._dt = gravity, dt
-        self._client: int | None = self.bullet.connect(self.bullet.DIRECT)
+        self._client: Client | None = Client(bullet.connect(bullet.DIRECT))
         self.clear()
 
     @property
-    def client(self) -> int:
-        """PyBullet's id of this world.
+    def bullet(self) -> Client:
+        """PyBullet, as of this world.
 
         Raises:
             WorldClosedError: If it is closed.
@@ -81,23 +99,15 @@ class World:
 
     def clear(self) -> None:
         """Remove every body, and with them PyBullet's cached trees, which never see a changed mass."""
-        self.bullet.resetSimulation(physicsClientId=self.client)
-        self.bullet.setGravity(0.0, 0.0, -self._gravity, physicsClientId=self.client)
-        self.bullet.setTimeStep(self._dt, physicsClientId=self.client)
+        self.bullet.resetSimulation()
+        self.bullet.setGravity(0.0, 0.0, -self._gravity)
+        self.bullet.setTimeStep(self._dt)
 
+    @override
     def close(self) -> None:
-        """Disconnect; a second call does nothing."""
         if self._client is not None:
-            self.bullet.disconnect(physicsClientId=self._client)
+            self._client.disconnect()
             self._client = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 RAY, THING, CHASSIS, WHEEL, FLOOR = 1, 2, 4, 8, 16
@@ -111,12 +121,12 @@ class RoomBodies:
     def __init__(self, world: World, room: Room) -> None:
         """Put a floor and the things of a room into a world, as they stand at time 0."""
         self._world = world
-        bullet, client = world.bullet, world.client
-        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-        self.floor = floor = int(bullet.createMultiBody(0.0, shape, physicsClientId=client))
+        bullet = world.bullet
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
+        self.floor = floor = int(bullet.createMultiBody(0.0, shape))
         """PyBullet's id of the floor."""
-        bullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)
-        bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL, physicsClientId=client)
+        bullet.changeDynamics(floor, -1, lateralFriction=1.0)
+        bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL)
         self.names: dict[int, str] = {}
         """Names of things by PyBullet's body ids."""
         self._coming: list[tuple[int, Block | Column, list[float], list[float]]] = []
@@ -148,19 +158,19 @@ class RoomBodies:
         if t == self._moved:
             return
         self._moved = t
-        put, client = self._world.bullet.resetBasePositionAndOrientation, self._world.client
+        put = self._world.bullet.resetBasePositionAndOrientation
         for body, person in self._walking:
             x, y = person.at(t)
-            put(body, [x, y, person.height / 2], [0.0, 0.0, 0.0, 1.0], physicsClientId=client)
+            put(body, [x, y, person.height / 2], [0.0, 0.0, 0.0, 1.0])
         for k, (body, door) in enumerate(self._doors):
             if (share := door.share(t)) != self._open[k]:
                 self._open[k] = share
-                put(body, *_pose(door.at(t)), physicsClientId=client)
+                put(body, *_pose(door.at(t)))
         for k, (body, thing, (x, y, z), turn) in enumerate(self._coming):
             there = thing.stands(t)
             if there != self._there[k]:
                 self._there[k] = there
-                put(body, [x, y, z if there else _BELOW], turn, physicsClientId=client)
+                put(body, [x, y, z if there else _BELOW], turn)
 
     def cast(self, origins: Array, directions: Array, height: float, reach: float) -> Array:
         """Return how far level rays go, as `FloorPlan.cast` does, but nothing from inside of a thing.
@@ -177,32 +187,23 @@ class RoomBodies:
             np.hstack([origins + reach * directions, level]).tolist(),
             numThreads=1,
             collisionFilterMask=THING,
-            physicsClientId=self._world.client,
         )
         return np.array([hit[2] * reach if hit[0] >= 0 else math.inf for hit in hits])
 
     def _box(self, block: Block) -> int:
         bullet = self._world.bullet
         half = [block.length / 2, block.width / 2, block.height / 2]
-        return int(
-            bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=self._world.client)
-        )
+        return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half))
 
     def _cylinder(self, radius: float, height: float) -> int:
         bullet = self._world.bullet
-        return int(
-            bullet.createCollisionShape(
-                bullet.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._world.client
-            )
-        )
+        return int(bullet.createCollisionShape(bullet.GEOM_CYLINDER, radius=radius, height=height))
 
     def _stand(self, shape: int, name: str, position: list[float], turn: list[float] | None = None) -> int:
-        bullet, client = self._world.bullet, self._world.client
-        body = bullet.createMultiBody(
-            0.0, shape, -1, position, [0.0, 0.0, 0.0, 1.0] if turn is None else turn, physicsClientId=client
-        )
-        bullet.changeDynamics(body, -1, lateralFriction=0.5, physicsClientId=client)
-        bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY, physicsClientId=client)
+        bullet = self._world.bullet
+        body = bullet.createMultiBody(0.0, shape, -1, position, [0.0, 0.0, 0.0, 1.0] if turn is None else turn)
+        bullet.changeDynamics(body, -1, lateralFriction=0.5)
+        bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY)
         self.names[int(body)] = name
         return int(body)
 
@@ -253,7 +254,7 @@ class Studio:
         """Make a body of triangles, (m, 3, 3), each flat in its own plane."""
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        bullet, client = self._world.bullet, self._world.client
+        bullet = self._world.bullet
         shape = bullet.createVisualShape(
             bullet.GEOM_MESH,
             vertices=triangles.reshape(-1, 3).tolist(),
@@ -261,16 +262,15 @@ class Studio:
             normals=np.repeat(normals, 3, axis=0).tolist(),
             rgbaColor=[*colour, 1.0],
             specularColor=[0.0, 0.0, 0.0],
-            physicsClientId=client,
         )
-        return int(bullet.createMultiBody(0.0, -1, shape, physicsClientId=client))
+        return int(bullet.createMultiBody(0.0, -1, shape))
 
     def place(self, figure: int, X: Array | None) -> None:
         """Put a shape at a pose in the world, (4, 4); None takes it away."""
         position, turn = (_OUT_OF_SIGHT, _UPRIGHT) if X is None else (X[:3, 3].tolist(), _quaternion(X[:3, :3]))
-        put, client = self._world.bullet.resetBasePositionAndOrientation, self._world.client
+        put = self._world.bullet.resetBasePositionAndOrientation
         for body in self._figures[figure]:
-            put(body, position, turn, physicsClientId=client)
+            put(body, position, turn)
 
     def draw(self, X_WC: Array, *, width: int, height: int, view: float, near: float, far: float) -> Picture:
         """Draw what a camera sees.
@@ -283,7 +283,7 @@ class Studio:
             near: Nothing nearer is drawn [m].
             far: Nothing farther is drawn [m].
         """
-        bullet, client = self._world.bullet, self._world.client
+        bullet = self._world.bullet
         eye, ahead, up = X_WC[:3, 3], X_WC[:3, 0], X_WC[:3, 2]
         vertical = 2.0 * math.atan(math.tan(view / 2) * height / width)
         image: tuple[Any, ...] = bullet.getCameraImage(
@@ -299,7 +299,6 @@ class Studio:
             shadow=0,
             renderer=bullet.ER_TINY_RENDERER,
             flags=bullet.ER_NO_SEGMENTATION_MASK,
-            physicsClientId=client,
         )
         colours = np.reshape(np.asarray(image[2], dtype=np.uint8), (height, width, 4))
         depth = np.reshape(np.asarray(image[3]), (height, width))

@@ -163,7 +163,7 @@ class CuboBody(MobileBody):
     def angles(self) -> Values:
         """Angles of the right arm, the left arm and the head [rad]."""
         joints = [self._joint(k) for k in range(len(p.CUBO.limbs))]
-        states = self.world.bullet.getJointStates(self.body_id, joints, physicsClientId=self.world.client)
+        states = self.world.bullet.getJointStates(self.body_id, joints)
         return tuple(float(state[0]) for state in states)
 
     @property
@@ -208,5 +208,4 @@ class CuboBody(MobileBody):
             velocityGain=1.0,
             force=limb.torque,
             maxVelocity=min(max(speed, 1e-3), limb.speed),
-            physicsClientId=self.world.client,
         )

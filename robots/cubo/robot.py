@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 from robots.base import PERIOD, Footprint, MobileBase
 from robots.cubo.body import MOVES, CuboBody
 from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, WHEEL_RADIUS
-from robots.cubo.shapes import links, shapes
+from robots.cubo.shapes import shapes
+from robots.mobile.shapes import links
 from robots.robot import Appearance, Robot, ThinClient
 from vrs.mobile import Wheels
 
@@ -20,7 +22,7 @@ ROBOT: Final = Robot(
         PERIOD,
         "cubo",
     ),
-    Appearance(shapes, links),
+    Appearance(shapes, partial(links, CUBO)),
     {"bullet": CuboBody},
     (ThinClient(MODEL_FILE, MOVES),),
 )

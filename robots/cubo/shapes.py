@@ -7,21 +7,14 @@ joints at angle 0.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from robots.base import upright
 from robots.cubo import parameters as p
-from robots.mobile.drive_train import as_posture
 from robots.mobile.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, wheel
 from robots.solids import Builder, LinkShape, drum, loft, slab
-from vrs.checks import finite_array
-from vrs.model import Array, frozen_array
 
 ORANGE: Final = (0.93, 0.48, 0.16)
 SCREEN: Final = (0.09, 0.16, 0.22)
@@ -118,49 +111,3 @@ def shapes() -> tuple[LinkShape, ...]:
         _arm("left arm", 1),
         _head(),
     )
-
-
-def links(posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), limbs: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-    """Return the poses of the shapes in the world.
-
-    Args:
-        posture: x, y [m], θ [rad], (3,).
-        wheels: Angles that the right and the left wheel have turned by [rad], (2,).
-        limbs: Angles of the right arm, the left arm and the head [rad], (3,).
-
-    Returns:
-        (7, 4, 4).
-
-    Raises:
-        InvalidValueError: If something isn't finite or of the wrong shape.
-    """
-    X_WR = upright(*as_posture("posture", posture))
-    poses = [X_WR]
-    turned = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
-    for angle, side in zip(turned, (-0.5, 0.5), strict=True):
-        c, s = math.cos(angle), math.sin(angle)
-        y, z = side * p.WHEEL_BASE, p.WHEEL_RADIUS
-        poses.append(X_WR @ np.array([[c, 0, s, 0], [0, 1, 0, y], [-s, 0, c, z], [0, 0, 0, 1.0]]))
-    poses.append(X_WR @ upright(*p.CUBO.casters[0], 0.0))
-    angles = finite_array("limbs", limbs, (3,), "three finite angles [rad]").tolist()
-    poses += [
-        X_WR @ limb_pose(angle, limb.joint, limb.axis) for angle, limb in zip(angles, p.CUBO.limbs, strict=True)
-    ]
-    return frozen_array(np.stack(poses))
-
-
-def limb_pose(angle: float, joint: tuple[float, float, float], axis: tuple[float, float, float]) -> Array:
-    """Return the pose of a limb in the robot's frame, (4, 4).
-
-    Args:
-        angle: Of its joint [rad].
-        joint: Where the axis is, in the robot's frame [m].
-        axis: A unit vector along it, in the robot's frame.
-    """
-    x, y, z = axis
-    c, s = math.cos(angle), math.sin(angle)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0.0]])
-    X = np.eye(4)
-    X[:3, :3] = np.eye(3) + s * K + (1 - c) * K @ K
-    X[:3, 3] = joint
-    return X

@@ -116,7 +116,7 @@ def load_chassis(
         radii: True radii of the right and the left wheel [m].
         base: True wheel base [m].
     """
-    bullet, client = world.bullet, world.client
+    bullet = world.bullet
     mass, centre, inertia = chassis.rigid()
     rigid = RigidLink(0.0, 0.0, 0.0, mass, centre, inertia)
     if (load := reality.payload) is not None:
@@ -127,14 +127,10 @@ def load_chassis(
         bullet.GEOM_BOX,
         halfExtents=[chassis.length / 2, chassis.width / 2, height / 2],
         collisionFramePosition=[chassis.centre_x, 0.0, chassis.ground_clearance + height / 2],
-        physicsClientId=client,
     )
     links = _links(chassis, reality, radii, base)
     shapes = [
-        bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=link.radius, physicsClientId=client)
-        if link.radius
-        else -1
-        for link in links
+        bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=link.radius) if link.radius else -1 for link in links
     ]
     n = len(links)
     x, y, theta = posture
@@ -155,17 +151,11 @@ def load_chassis(
         linkParentIndices=[link.parent for link in links],
         linkJointTypes=[bullet.JOINT_FIXED if link.axis is None else bullet.JOINT_REVOLUTE for link in links],
         linkJointAxis=[[0.0, 0.0, 1.0] if link.axis is None else list(link.axis) for link in links],
-        physicsClientId=client,
     )
     bullet.changeDynamics(
-        body,
-        -1,
-        linearDamping=0.0,
-        angularDamping=0.0,
-        activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-        physicsClientId=client,
+        body, -1, linearDamping=0.0, angularDamping=0.0, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING
     )
-    bullet.changeDynamics(body, -1, maxJointVelocity=_FREE_SPEED, physicsClientId=client)
+    bullet.changeDynamics(body, -1, maxJointVelocity=_FREE_SPEED)
     # Not in one call with linearDamping or maxJointVelocity: with either, PyBullet takes the base for the link.
     for j in range(-1, n):
         bullet.changeDynamics(
@@ -177,17 +167,12 @@ def load_chassis(
             rollingFriction=0.0,
             restitution=0.0,
             localInertiaDiagonal=diagonal if j < 0 else links[j].inertia,
-            physicsClientId=client,
         )
         group, mask = (CHASSIS, THING) if j < 0 else (WHEEL, FLOOR)
-        bullet.setCollisionFilterGroupMask(body, j, group, mask, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(body, j, group, mask)
     turning = [j for j in range(n) if links[j].axis is not None]
     bullet.setJointMotorControlArray(
-        body,
-        turning,
-        bullet.VELOCITY_CONTROL,
-        forces=[links[j].resistance for j in turning],
-        physicsClientId=client,
+        body, turning, bullet.VELOCITY_CONTROL, forces=[links[j].resistance for j in turning]
     )
     return int(body), rigid.centre, R_principal.T
 
@@ -227,18 +212,16 @@ def put_cargo(world: World, cargo: Cargo, robot: int, floor: int, place: tuple[f
     Returns:
         PyBullet's id of the cargo.
     """
-    bullet, client = world.bullet, world.client
+    bullet = world.bullet
     half = [cargo.length / 2, cargo.width / 2, cargo.height / 2]
-    shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+    shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half)
     x, y, z, angle = (finite("place", value) for value in place)
     turn = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
-    body = int(
-        bullet.createMultiBody(cargo.mass, shape, -1, [x, y, z + half[2] + _GAP], turn, physicsClientId=client)
-    )
-    bullet.changeDynamics(body, -1, lateralFriction=cargo.friction, physicsClientId=client)
-    bullet.setCollisionFilterGroupMask(body, -1, 0, 0, physicsClientId=client)
+    body = int(bullet.createMultiBody(cargo.mass, shape, -1, [x, y, z + half[2] + _GAP], turn))
+    bullet.changeDynamics(body, -1, lateralFriction=cargo.friction)
+    bullet.setCollisionFilterGroupMask(body, -1, 0, 0)
     for other in (robot, floor):
-        bullet.setCollisionFilterPair(body, other, -1, -1, 1, physicsClientId=client)
+        bullet.setCollisionFilterPair(body, other, -1, -1, 1)
     return body
 
 
@@ -277,7 +260,7 @@ class MobileBody(MobileRobot):
         self.world = World(gravity=self.reality.gravity, dt=self.reality.dt)
         """The PyBullet world of the robot and its room."""
         self.world.bullet.setPhysicsEngineParameter(
-            numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1, physicsClientId=self.world.client
+            numSolverIterations=_ITERATIONS, deterministicOverlappingPairs=1
         )
         self._room_bodies = RoomBodies(self.world, self.room)
         self._cargo: list[int] = []
@@ -305,7 +288,7 @@ class MobileBody(MobileRobot):
     @property
     def motion(self) -> tuple[float, float]:
         """True speed v of the middle of the axle, forward [m/s], and ω [rad/s]."""
-        linear, angular = self.world.bullet.getBaseVelocity(self.body_id, physicsClientId=self.world.client)
+        linear, angular = self.world.bullet.getBaseVelocity(self.body_id)
         _, R = self._pose()
         velocity = np.array(linear) - np.cross(angular, R @ self._centre)
         return float(velocity @ R[:, 0]), float(angular[2])
@@ -318,11 +301,11 @@ class MobileBody(MobileRobot):
     @property
     def wheels(self) -> tuple[Wheel, Wheel]:
         """What the right and the left wheel do."""
-        bullet, client, body = self.world.bullet, self.world.client, self.body_id
+        bullet, body = self.world.bullet, self.body_id
         found: list[Wheel] = []
         for j in DRIVES:
-            _, speed, _, torque = bullet.getJointState(body, j, physicsClientId=client)
-            points = bullet.getContactPoints(bodyA=body, linkIndexA=j, physicsClientId=client)
+            _, speed, _, torque = bullet.getJointState(body, j)
+            points = bullet.getContactPoints(bodyA=body, linkIndexA=j)
             found.append(Wheel(speed, torque, sum(point[9] for point in points)))
         return found[0], found[1]
 
@@ -352,8 +335,8 @@ class MobileBody(MobileRobot):
     def cargo(self) -> tuple[tuple[float, float, float], ...]:
         """Where the middle of each thing that was put on top is now, in the robot's frame, x, y, z [m]."""
         at, R = self._pose()
-        bullet, client = self.world.bullet, self.world.client
-        found = (bullet.getBasePositionAndOrientation(one, physicsClientId=client)[0] for one in self._cargo)
+        bullet = self.world.bullet
+        found = (bullet.getBasePositionAndOrientation(one)[0] for one in self._cargo)
         places = (R.T @ (np.array(place) - at) for place in found)
         return tuple((float(x), float(y), float(z)) for x, y, z in places)
 
@@ -362,12 +345,12 @@ class MobileBody(MobileRobot):
         """Whether the robot's world is closed."""
         return self.world.closed
 
+    @override
     def close(self) -> None:
-        """Disconnect the world; a second call does nothing."""
         self.world.close()
 
     def _ready(self) -> None:
-        _ = self.world.client
+        _ = self.world.bullet
 
     def _advance(self, n: int) -> None:
         train, dt, moving = self._train, self.reality.dt, self._room_bodies.moving
@@ -385,7 +368,7 @@ class MobileBody(MobileRobot):
 
     def _turn(self, right: float, left: float) -> None:
         """Step once with the tyres' wanted speeds [rad/s]."""
-        bullet, client = self.world.bullet, self.world.client
+        bullet = self.world.bullet
         bullet.setJointMotorControlArray(
             self.body_id,
             DRIVES,
@@ -395,9 +378,8 @@ class MobileBody(MobileRobot):
             positionGains=self._gains,
             velocityGains=(1.0, 1.0),
             forces=self._torques,
-            physicsClientId=client,
         )
-        bullet.stepSimulation(physicsClientId=client)
+        bullet.stepSimulation()
         dt = self.reality.dt
         self._target_right += right * dt
         self._target_left += left * dt
@@ -414,7 +396,7 @@ class MobileBody(MobileRobot):
         self._truth = float(x), float(y), heading + turns * math.tau
         if self._steps % self._every_encoder:
             return
-        states = self.world.bullet.getJointStates(self.body_id, DRIVES, physicsClientId=self.world.client)
+        states = self.world.bullet.getJointStates(self.body_id, DRIVES)
         right, left = states[0][0], states[1][0]
         slip_right, slip_left = self._train.slips
         self._angles = (
@@ -427,9 +409,7 @@ class MobileBody(MobileRobot):
 
     def _look(self) -> None:
         """Note what the chassis touches."""
-        points = self.world.bullet.getContactPoints(
-            bodyA=self.body_id, linkIndexA=-1, physicsClientId=self.world.client
-        )
+        points = self.world.bullet.getContactPoints(bodyA=self.body_id, linkIndexA=-1)
         names = self._room_bodies.names
         # What lies on top has no name in the room.
         touched = sorted({names[point[2]] for point in points if point[8] <= 0.0 and point[2] in names})
@@ -439,7 +419,7 @@ class MobileBody(MobileRobot):
     def _pose(self) -> tuple[Array, Array]:
         """Where the robot's frame is, (3,), and how it's turned, (3, 3)."""
         bullet = self.world.bullet
-        position, turn = bullet.getBasePositionAndOrientation(self.body_id, physicsClientId=self.world.client)
+        position, turn = bullet.getBasePositionAndOrientation(self.body_id)
         R = np.array(bullet.getMatrixFromQuaternion(turn)).reshape(3, 3) @ self._R_CR
         return np.array(position) - R @ self._centre, R
 
@@ -447,14 +427,14 @@ class MobileBody(MobileRobot):
         """Shift what settling moved, so that the robot begins at its start; wheels count from there."""
         self._move(start)
         for j in DRIVES:
-            self.world.bullet.resetJointState(self.body_id, j, 0.0, physicsClientId=self.world.client)
+            self.world.bullet.resetJointState(self.body_id, j, 0.0)
         self._target_right = self._target_left = 0.0
 
     def _move(self, start: tuple[float, float, float]) -> None:
         """Turn the robot about the vertical and shift it, so that it stands at a posture."""
         (x, y, _), R = self._pose()
-        bullet, client = self.world.bullet, self.world.client
-        position, turn = bullet.getBasePositionAndOrientation(self.body_id, physicsClientId=client)
+        bullet = self.world.bullet
+        position, turn = bullet.getBasePositionAndOrientation(self.body_id)
         # A turn about the vertical through the robot's own reference point, then a shift.
         angle = math.remainder(start[2] - math.atan2(R[1, 0], R[0, 0]), math.tau)
         c, s = math.cos(angle), math.sin(angle)
@@ -462,7 +442,7 @@ class MobileBody(MobileRobot):
         place = [start[0] + c * dx - s * dy, start[1] + s * dx + c * dy, position[2]]
         upright = [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
         _, turned = bullet.multiplyTransforms([0.0] * 3, upright, [0.0] * 3, turn)
-        bullet.resetBasePositionAndOrientation(self.body_id, place, turned, physicsClientId=client)
+        bullet.resetBasePositionAndOrientation(self.body_id, place, turned)
 
     @override
     def shafts(self) -> tuple[float, float]:

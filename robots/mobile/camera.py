@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Annotated, Final, NamedTuple
 
 import numpy as np
+from msgspec import Meta
 
 from robots.base import upright
 from robots.bullet.rooms import EMPTY, Room, is_wall
@@ -34,9 +35,9 @@ from vrs.timeline import Timeline
 class Lens:
     """What the camera sees of what is before it."""
 
-    width: int = 352
+    width: Annotated[int, Meta(ge=64, le=1920, multiple_of=16)] = 352
     """Pixels across, a multiple of 16, 64 to 1920."""
-    height: int = 264
+    height: Annotated[int, Meta(ge=48, le=1080, multiple_of=2)] = 264
     """Pixels down, a multiple of 2, 48 to 1080."""
     view: Annotated[float, within(0.2, 2.4)] = math.radians(65.0)
     """Horizontal angle of view [rad], 0.2 to 2.4; an assumption: a usual wide lens of such cameras."""
@@ -44,12 +45,6 @@ class Lens:
     """Nothing nearer is seen [m], 0.001 to 1."""
     far: Annotated[float, within(2.0, 1000.0)] = 60.0
     """Nothing farther is seen [m], 2 to 1000."""
-
-    def __post_init__(self) -> None:
-        for name, low, high, step in (("width", 64, 1920, 16), ("height", 48, 1080, 2)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high or value % step:
-                raise InvalidValueError(name, value, f"a multiple of {step} in [{low}, {high}]")
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from robots.onboard.movers import MoversConfig, YieldingConfig
 from robots.onboard.navigator import CELL, Navigator
 from robots.onboard.routes import RouteConfig, RouteMap
 from vrs.mobile import Grid
+from vrs.mobile.model import placed
 from vrs.model import Array
 
 CLEARANCE = 0.02
@@ -54,9 +55,8 @@ def route_map(room: Room, body: Footprint) -> RouteMap:
 
 
 def _corners(x: float, y: float, angle: float, length: float, width: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
     half = 0.5 * np.array([[length, width], [-length, width], [-length, -width], [length, -width]])
-    return np.asarray(half @ np.array([[c, s], [-s, c]]) + (x, y))
+    return placed(half, (x, y, angle))
 
 
 class BodyNavigator:

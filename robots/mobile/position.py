@@ -20,6 +20,7 @@ from robots.onboard.localizer import Localizer, LocalizerConfig
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
+from vrs.mobile.model import composed
 
 _KEPT = 2.0
 """How much odometry is kept [s]: older pictures don't count."""
@@ -118,8 +119,7 @@ class FusedPosition:
         return self._placed(x, y, theta)
 
     def _placed(self, x: float, y: float, theta: float) -> Posture:
-        cos, sin = math.cos(self._turn), math.sin(self._turn)
-        return Posture(self._x + cos * x - sin * y, self._y + sin * x + cos * y, theta + self._turn)
+        return Posture(*composed((self._x, self._y, self._turn), (x, y, theta)))
 
     def _correct(self, t: float, seen: list[float]) -> None:
         then = self._then(t)

@@ -6,8 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import ClassVar, Final, Self
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,12 +14,13 @@ from typing_extensions import override
 
 from robots.base import PERIOD
 from robots.bullet.rooms import EMPTY, Room, load_room
-from robots.mobile.chassis import Chassis, MobileReality, Senses
+from robots.mobile.chassis import Chassis, MobileReality, Senses, centre_of
 from robots.mobile.drive_train import DriveTrain, Odometry, as_posture
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, SonarScan
 from robots.onboard.following import SensorWatch
 from robots.onboard.laser import LaserScan
+from robots.robot import Closing
 from vrs.checks import finite, integer_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
@@ -58,7 +58,7 @@ class Collision:
     """What, by its name in the room."""
 
 
-class MobileRobot(ABC):
+class MobileRobot(Closing, ABC):
     """A real mobile robot: told (v, ω), it goes on by steps of `reality.dt` and senses on the way."""
 
     _STEP: ClassVar[float]
@@ -259,18 +259,6 @@ class MobileRobot(ABC):
         """Go on by one control period; arguments and errors as of `drive`."""
         self.drive(v, w, self._period_steps)
 
-    def close(self) -> None:
-        """Give back what the robot holds; a second call does nothing."""
-        return
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     @abstractmethod
     def _begin(self) -> None:
         """Make what the robot needs to go on, from `_truth`."""
@@ -358,10 +346,9 @@ class MobileRobot(ABC):
 
     def _overlap(self, posture: tuple[float, float, float]) -> str:
         """What the body's outline overlaps at a posture."""
-        x, y, theta = posture
         body = self.chassis
-        middle_x, middle_y = x + body.centre_x * math.cos(theta), y + body.centre_x * math.sin(theta)
-        return self._plan.touched(middle_x, middle_y, theta, (body.length / 2, body.width / 2), self.time)
+        x, y, theta = centre_of(posture, body.centre_x)
+        return self._plan.touched(x, y, theta, (body.length / 2, body.width / 2), self.time)
 
     def _touch(self, thing: str) -> None:
         """Note what the body touches; a touch that goes on is one collision."""
@@ -435,10 +422,9 @@ class BareBody(MobileRobot):
 
     def _look_out(self) -> None:
         """Stay where the way leads into something; or work out how long nothing can be met."""
-        x, y, theta = self._truth
         body = self.chassis
-        middle_x, middle_y = x + body.centre_x * math.cos(theta), y + body.centre_x * math.sin(theta)
-        space = self._plan.clearance(middle_x, middle_y, self.time) - body.reach
+        x, y, _ = centre_of(self._truth, body.centre_x)
+        space = self._plan.clearance(x, y, self.time) - body.reach
         if space > 0:
             self._touch("")
             # Slip and wrong wheels add a few percent to the speeds; half as much again is beyond any of them.

@@ -15,6 +15,7 @@ import numpy as np
 from robots.mobile.chassis import CameraModel, Chassis, SonarModel
 from robots.mobile.drive_train import standard_normals
 from robots.onboard.laser import LaserModel, LaserScan
+from vrs.mobile.model import placed, turned
 from vrs.model import Array, frozen_array
 
 Cast = Callable[[Array, Array], Array]
@@ -134,10 +135,7 @@ class SonarRing:
 
     def rays(self, posture: tuple[float, float, float]) -> tuple[Array, Array]:
         """Return where rays begin [m] and their unit vectors, (16 × rays, 2) each, in the world frame."""
-        x, y, theta = posture
-        c, s = math.cos(theta), math.sin(theta)
-        turn = np.array([[c, s], [-s, c]])
-        return self._origins @ turn + (x, y), self._ways @ turn
+        return placed(self._origins, posture), turned(self._ways, posture[2])
 
     def scan(self, distances: Array, time: float) -> SonarScan:
         """Make a scan of the rays' exact distances, (16 × rays,), inf where nothing was met."""

@@ -17,7 +17,6 @@ from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.mobile.chassis import Chassis
 from robots.mobile.drive_train import as_posture
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
-from vrs.checks import finite_array
 from vrs.model import Array, frozen_array
 
 WHITE: Final = (0.92, 0.92, 0.89)
@@ -138,35 +137,25 @@ def on_wheels(body: LinkShape, chassis: Chassis) -> tuple[LinkShape, ...]:
     )
 
 
-def links(
-    chassis: Chassis, posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), casters: ArrayLike = (0.0, 0.0)
-) -> Array:
-    """Return the poses of a robot's shapes in the world.
+def links(chassis: Chassis, posture: ArrayLike) -> Array:
+    """Return the poses of a robot's shapes in the world: body, right and left wheel, casters, limbs at angle 0.
 
     Args:
         chassis: Of the robot.
         posture: x, y [m], θ [rad], (3,).
-        wheels: Angles that the right and the left wheel have turned by [rad], (2,).
-        casters: Where the casters' forks point, 0 behind their axes [rad], (2,).
 
     Returns:
-        (5, 4, 4).
+        (m, 4, 4).
 
     Raises:
-        InvalidValueError: If something isn't finite or of the wrong shape.
+        InvalidValueError: If the posture isn't finite or of the wrong shape.
     """
-    x, y, theta = as_posture("posture", posture)
-    right, left = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
-    swivels = finite_array("casters", casters, (2,), "two finite angles [rad]").tolist()
-    X_WR = upright(x, y, theta)
-    poses = [X_WR]
-    for angle, side in ((right, -0.5), (left, 0.5)):
-        c, s = math.cos(angle), math.sin(angle)
-        y, z = side * chassis.wheel_base, chassis.wheel_radius
-        turned = np.array([[c, 0, s, 0], [0, 1, 0, y], [-s, 0, c, z], [0, 0, 0, 1.0]])
-        poses.append(X_WR @ turned)
-    poses += [X_WR @ upright(*at, angle) for at, angle in zip(chassis.casters, swivels, strict=True)]
-    return frozen_array(np.stack(poses))
+    side = 0.5 * chassis.wheel_base
+    offsets = [(0.0, 0.0, 0.0), (0.0, -side, chassis.wheel_radius), (0.0, side, chassis.wheel_radius)]
+    offsets += [(x, y, 0.0) for x, y in chassis.casters] + [limb.joint for limb in chassis.limbs]
+    X_RS = np.tile(np.eye(4), (len(offsets), 1, 1))
+    X_RS[:, :3, 3] = offsets
+    return frozen_array(upright(*as_posture("posture", posture)) @ X_RS)
 
 
 def room_shapes(room: Room) -> tuple[LinkShape, ...]:

@@ -28,7 +28,7 @@ from robots.onboard.driving import IPR_LIMITS, STAND, Drive, kept
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, clipped, wrapped
-from vrs.mobile.model import all_wrapped
+from vrs.mobile.model import all_wrapped, placed
 from vrs.model import Array
 
 _STRAIGHT = 1e-4
@@ -134,6 +134,13 @@ class SonarMount:
 Mounts = Annotated[tuple[SonarMount, ...], Meta(min_length=1, max_length=64)]
 
 
+def seen_from(origins: Array, angles: Array, points: Array) -> tuple[Array, Array]:
+    """Distances of points (p, 2) from sonars (k, 2), and how far along where they look, (p, k) each."""
+    dx = points[:, :1] - origins[:, 0]
+    dy = points[:, 1:] - origins[:, 1]
+    return np.sqrt(dx * dx + dy * dy), dx * np.cos(angles) + dy * np.sin(angles)
+
+
 @dataclass(frozen=True, slots=True)
 @validated
 class AvoidanceConfig:
@@ -205,10 +212,7 @@ class ObstacleAvoidance:
         if not heard.any():
             self._points, self._seen = points, seen
             return
-        x, y, theta = posture
-        cos, sin = math.cos(theta), math.sin(theta)
-        origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-        angles = self._mounts[:, 2] + theta
+        origins, angles = placed(self._mounts[:, :2], posture), self._mounts[:, 2] + posture[2]
         if len(points):
             stands = self._stands(points, origins[heard], angles[heard], r[heard])
             points, seen = points[stands], seen[stands]
@@ -310,10 +314,7 @@ class ObstacleAvoidance:
     def _stands(self, points: Array, origins: Array, angles: Array, ranges: Array) -> NDArray[np.bool_]:
         """Whether no reading sees further than to a point, well inside its cone, (m,)."""
         config = self._config
-        dx = points[:, :1] - origins[:, 0]
-        dy = points[:, 1:] - origins[:, 1]
-        distance = np.sqrt(dx * dx + dy * dy)
-        along = dx * np.cos(angles) + dy * np.sin(angles)
+        distance, along = seen_from(origins, angles, points)
         inside = along >= math.cos(_SEEN * config.half_cone) * distance
         through = (inside & (distance < ranges - config.noise)).any(axis=1)
         return np.asarray(~through)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vrs.checks import bounded_text, finite_array, one_of
+from vrs.checks import bounded_text, finite_array, word
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, frozen_array
 
@@ -268,7 +268,7 @@ class Curve:
         Raises:
             InvalidValueError: If the points aren't such, or the curve has a cusp: it would stop and turn back.
         """
-        self.kind = CurveKind(one_of("kind", kind, list(CurveKind)))
+        self.kind = word("kind", kind, CurveKind)
         self.points = _checked(points)
         """As given, (k, 2) [m]."""
         pieces = _cubic_spline(self.points) if self.kind is CurveKind.CUBIC else _quadratic_spline(self.points)

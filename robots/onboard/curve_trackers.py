@@ -21,14 +21,50 @@ from __future__ import annotations
 
 import enum
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated
 
+from typing_extensions import override
+
 from robots.onboard.curve import Curve
 from robots.onboard.driving import STAND, Drive
-from vrs.checks import number_in, one_of, validated, within
+from vrs.checks import number_in, validated, within
 from vrs.mobile import wheel_speeds
 from vrs.mobile.model import Wheels
+
+
+class _CurveTracker(ABC):
+    """Drives a robot towards a point ahead on a curve."""
+
+    def __init__(self, curve: Curve, arrival: float, window: float) -> None:
+        self._curve, self._arrival, self._window = curve, arrival, window
+        self._end = curve.at(curve.length)
+        self.s: float | None = None
+        """s₀: way along the path to its point nearest to the robot, at the last call [m]."""
+
+    def control(self, posture: tuple[float, float, float]) -> Drive:
+        """Say what to drive until the next call.
+
+        Args:
+            posture: Where the robot is, (x, y, θ) [m, m, rad]; only finite numbers.
+        """
+        x, y, theta = posture
+        if math.hypot(self._end.x - x, self._end.y - y) <= self._arrival:
+            return STAND
+        self.s = self._curve.nearest(x, y, around=self.s, window=self._window)
+        point = self._curve.at(self._reference(self.s))
+        dx, dy = point.x - x, point.y - y
+        cos, sin = math.cos(theta), math.sin(theta)
+        return self._towards(cos * dx + sin * dy, cos * dy - sin * dx, dx * dx + dy * dy)
+
+    @abstractmethod
+    def _reference(self, s: float) -> float:
+        """Way along the path to the point [m], of the way to the nearest one."""
+
+    @abstractmethod
+    def _towards(self, ahead: float, left: float, square: float) -> Drive:
+        """The drive towards a point that's so far ahead and to the left [m], its distance's square [m²]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,38 +84,26 @@ class PurePursuitConfig:
     """How far from where it was on the path the nearest point is looked for [m], in [1e-2, 1e9]."""
 
 
-class PurePursuit:
+class PurePursuit(_CurveTracker):
     """Drives a robot forward along a curve; called once a period, it knows no clock."""
 
     def __init__(self, curve: Curve, config: PurePursuitConfig | None = None) -> None:
         """Take the path."""
-        self._curve = curve
-        self._config = PurePursuitConfig() if config is None else config
-        self._end = curve.at(curve.length)
-        self.s: float | None = None
-        """Way along the path to its point nearest to the robot, at the last call [m]."""
+        self._config = config = PurePursuitConfig() if config is None else config
+        super().__init__(curve, config.arrival, config.window)
 
-    def control(self, posture: tuple[float, float, float]) -> Drive:
-        """Say what to drive until the next call.
+    @override
+    def _reference(self, s: float) -> float:
+        return s + self._config.ahead
 
-        Args:
-            posture: Where the robot is, (x, y, θ) [m, m, rad]; only finite numbers.
-        """
-        x, y, theta = posture
-        curve, config = self._curve, self._config
-        if math.hypot(self._end.x - x, self._end.y - y) <= config.arrival:
-            return STAND
-        self.s = curve.nearest(x, y, around=self.s, window=config.window)
-        point = curve.at(self.s + config.ahead)
-        dx, dy = point.x - x, point.y - y
-        left = math.cos(theta) * dy - math.sin(theta) * dx
-        square = dx * dx + dy * dy
+    @override
+    def _towards(self, ahead: float, left: float, square: float) -> Drive:
         if square == 0:
             return STAND
         curvature = 2 * left / square
-        speed = config.speed
-        if abs(curvature) * speed > config.most_turning:
-            speed = config.most_turning / abs(curvature)
+        speed = self._config.speed
+        if abs(curvature) * speed > self._config.most_turning:
+            speed = self._config.most_turning / abs(curvature)
         return Drive(speed, curvature * speed)
 
 
@@ -114,40 +138,25 @@ class QuadraticTrackerConfig:
     def __post_init__(self) -> None:
         if self.window != math.inf:
             number_in("window", self.window, 1e-2, 1e9)
-        object.__setattr__(self, "backwards", Backwards(one_of("backwards", self.backwards, list(Backwards))))
 
 
-class QuadraticCurveTracker:
+class QuadraticCurveTracker(_CurveTracker):
     """Drives a robot along a curve by its position alone; called once a period, it knows no clock."""
 
     def __init__(self, curve: Curve, config: QuadraticTrackerConfig | None = None) -> None:
         """Take the path."""
-        self._curve = curve
-        self._config = QuadraticTrackerConfig() if config is None else config
-        self._end = curve.at(curve.length)
-        self.s: float | None = None
-        """s₀: way along the path to its point nearest to the robot, at the last call [m]."""
+        self._config = config = QuadraticTrackerConfig() if config is None else config
+        super().__init__(curve, config.arrival, config.window)
 
-    def control(self, posture: tuple[float, float, float]) -> Drive:
-        """Say what to drive until the next call.
-
-        Args:
-            posture: Where the robot is, (x, y, θ) [m, m, rad]; only finite numbers.
-        """
-        x, y, theta = posture
+    @override
+    def _reference(self, s: float) -> float:
+        # Source: eq. (5), (6).
         config = self._config
-        if math.hypot(self._end.x - x, self._end.y - y) <= config.arrival:
-            return STAND
-        ahead = self._curve.at(self._reference(x, y))
-        dx, dy = ahead.x - x, ahead.y - y
-        cos, sin = math.cos(theta), math.sin(theta)
-        return parabola_drive(cos * dx + sin * dy, cos * dy - sin * dx, config.alpha, config.backwards)
+        return s + config.s_max / (1 + config.beta * self._curve.most_curvature(s, s + config.s_max))
 
-    def _reference(self, x: float, y: float) -> float:
-        """Way along the path to the reference point [m]. Source: eq. (5), (6)."""
-        curve, config = self._curve, self._config
-        self.s = s = curve.nearest(x, y, around=self.s, window=config.window)
-        return s + config.s_max / (1 + config.beta * curve.most_curvature(s, s + config.s_max))
+    @override
+    def _towards(self, ahead: float, left: float, square: float) -> Drive:
+        return parabola_drive(ahead, left, self._config.alpha, self._config.backwards)
 
 
 def parabola_drive(e_x: float, e_y: float, alpha: float, backwards: Backwards = Backwards.PRINTED) -> Drive:

@@ -9,20 +9,21 @@ Source: Kim, Han, Kim, Kim 2002, section 3.1; eq. (3) and (7).
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from vrs.checks import bounded_text
 from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile.model import placed
 from vrs.model import Array, frozen_array
 
-SCHEMA: Final = "vrs-gsp-map/1"
+SCHEMA: Final[Literal["vrs-gsp-map/1"]] = "vrs-gsp-map/1"
 MOST_LINES: Final = 2000
 MOST_BYTES: Final = 64 * 1024 * 1024
 _LARGEST: Final = 1e6
@@ -96,12 +97,8 @@ class Lines:
 
     def moved(self, posture: tuple[float, float, float]) -> Lines:
         """The same lines as told by somebody in whose frame a robot is at a posture, if they're in the robot's."""
-        x, y, theta = posture
-        c, s = math.cos(theta), math.sin(theta)
-        places = self.poses[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
-        return Lines.of(
-            np.column_stack([places, self.poses[:, 2] + theta]), self.spans, self.variances, self.counts
-        )
+        poses = np.column_stack([placed(self.poses[:, :2], posture), self.poses[:, 2] + posture[2]])
+        return Lines.of(poses, self.spans, self.variances, self.counts)
 
 
 def injection(theta: ArrayLike) -> Array:
@@ -179,17 +176,25 @@ class GspMap:
 
     def to_json(self) -> str:
         """The map as text; numbers read back exactly."""
-        lines = self.lines
-        document = {
-            "schema": SCHEMA,
-            "name": self.name,
-            "poses": lines.poses.tolist(),
-            "spans": lines.spans.tolist(),
-            "variances": lines.variances.tolist(),
-            "counts": lines.counts.tolist(),
-            "covariance": self.covariance.tolist(),
-        }
-        return json.dumps(document, allow_nan=False) + "\n"
+        lines, counts = self.lines, self.lines.counts.tolist()
+        columns = [a.tolist() for a in (lines.poses, lines.spans, lines.variances)]
+        file = _MapFile(SCHEMA, self.name, *columns, counts=counts, covariance=self.covariance.tolist())
+        return msgspec.json.encode(file).decode() + "\n"
+
+
+_Numbers = Annotated[list[list[float]], Meta(max_length=2 * MOST_LINES)]
+
+
+class _MapFile(msgspec.Struct):
+    """A map as it's written."""
+
+    schema: Literal["vrs-gsp-map/1"]
+    name: str
+    poses: _Numbers
+    spans: _Numbers
+    variances: _Numbers
+    counts: Annotated[list[Annotated[int, Meta(ge=0, le=1_000_000)]], Meta(max_length=MOST_LINES)]
+    covariance: _Numbers
 
 
 def read_map(text: str, where: str = "map") -> GspMap:
@@ -203,30 +208,13 @@ def read_map(text: str, where: str = "map") -> GspMap:
         FormatError: If it isn't one.
     """
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError):
-        raise FormatError(where, "no JSON") from None
-    if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        raise FormatError(where, f"no map of schema {SCHEMA}")
-    counts = document.get("counts")
-    if not isinstance(counts, list) or len(counts) > MOST_LINES:
-        raise FormatError(where, f"counts must be of at most {MOST_LINES} lines")
-    try:
-        m = len(counts)
-        shapes = {"poses": (m, 3), "spans": (m, 2), "variances": (m, 2), "covariance": (2 * m, 2 * m)}
-        arrays = {name: _array(document.get(name), shape) for name, shape in shapes.items()}
-        if not all(type(count) is int and 0 <= count <= _LARGEST for count in counts):
-            raise InvalidValueError("counts", counts[:3], "integers, not negative")
-        lines = Lines.of(arrays["poses"], arrays["spans"], arrays["variances"], counts)
-        return GspMap.of(str(document.get("name", where))[:80], lines, arrays["covariance"])
-    except (InvalidValueError, ValueError, TypeError, OverflowError) as error:
+        file = msgspec.json.decode(text, type=_MapFile)
+        m = len(file.counts)
+        shaped = (np.array(a).reshape(m, k) for a, k in ((file.poses, 3), (file.spans, 2), (file.variances, 2)))
+        lines = Lines.of(*shaped, file.counts)
+        return GspMap.of(file.name[:80], lines, np.array(file.covariance).reshape(2 * m, 2 * m))
+    except (msgspec.MsgspecError, RecursionError, ValueError) as error:
         raise FormatError(where, str(error).splitlines()[0]) from None
-
-
-def _array(value: object, shape: tuple[int, ...]) -> Array:
-    """Nested lists as an array; lists of no lines have the shape of none."""
-    array = np.asarray(value, dtype=np.float64)
-    return array.reshape(shape) if array.size == math.prod(shape) else array
 
 
 def save_map(built: GspMap, path: Path | str) -> None:

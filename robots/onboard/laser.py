@@ -31,13 +31,14 @@ import struct
 from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vrs.checks import finite, number_in, validated, within
 from vrs.errors import FormatError, InvalidValueError
+from vrs.mobile.model import sinc, wrapped
 from vrs.model import Array, frozen_array
 
 STEPS_DEG: Final = (0.25, 0.5, 1.0)
@@ -136,6 +137,17 @@ class Points:
         return np.asarray(np.sum((self.places - self.origins) * self.ways, axis=1))
 
 
+class OdometryStep(NamedTuple):
+    """The arc between two readings of the odometry."""
+
+    way: float
+    """Its length, negative backwards [m]."""
+    turn: float
+    """By what angle it turns [rad]."""
+    dt: float
+    """How long it took [s]."""
+
+
 class OdometryTrack:
     """The last readings of the odometry, linear in between."""
 
@@ -144,6 +156,8 @@ class OdometryTrack:
         self._kept = kept
         self._times: deque[float] = deque()
         self._postures: deque[tuple[float, float, float]] = deque()
+        self._scanned = -math.inf
+        """When the last scan was taken that it took in [s]."""
 
     @property
     def newest(self) -> tuple[float, float, float] | None:
@@ -179,6 +193,25 @@ class OdometryTrack:
         while self._times[0] < time - self._kept:
             self._times.popleft()
             self._postures.popleft()
+
+    def step(self, time: float, posture: tuple[float, float, float]) -> OdometryStep | None:
+        """Take a reading as `add` does; the step from the one before; None without one, or any news."""
+        before, was = self.newest, self.time
+        self.add(time, posture)
+        if before is None or time <= was:
+            return None
+        turn = wrapped(posture[2] - before[2])
+        dx, dy = posture[0] - before[0], posture[1] - before[1]
+        middle = before[2] + 0.5 * turn
+        way = (dx * math.cos(middle) + dy * math.sin(middle)) / sinc(0.5 * turn)
+        return OdometryStep(way, turn, time - was)
+
+    def takes(self, scan: LaserScan) -> bool:
+        """Whether a scan is newer than those that it said this of, and the readings cover it."""
+        if scan.time <= self._scanned or not self.covers(scan.time, scan.end):
+            return False
+        self._scanned = scan.time
+        return True
 
     def covers(self, start: float, end: float) -> bool:
         """Whether readings reach from one time to another [s]."""

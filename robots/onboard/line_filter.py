@@ -34,7 +34,7 @@ from robots.onboard.laser import Points
 from vrs.checks import finite_array, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
-from vrs.mobile.model import all_wrapped, sinc
+from vrs.mobile.model import all_wrapped, placed, sinc, turned
 from vrs.model import Array, frozen_array
 
 OWN = 6
@@ -523,10 +523,7 @@ def evidence(lines: Lines, points: Points, posture: tuple[float, float, float], 
 
 def expected_ranges(lines: Lines, origins: Array, ways: Array, posture: tuple[float, float, float]) -> Array:
     """How far beams in the robot's frame would go in a map [m], (k,), inf where they'd meet nothing."""
-    x, y, theta = posture
-    c, s = math.cos(theta), math.sin(theta)
-    turn = np.array([[c, s], [-s, c]])
-    return cast_lines(lines.ends, origins @ turn + (x, y), ways @ turn)
+    return cast_lines(lines.ends, placed(origins, posture), turned(ways, posture[2]))
 
 
 def judged(difference: Array, noise: float) -> Evidence:

@@ -29,8 +29,8 @@ from robots.onboard.laser import LaserScan, OdometryTrack, Points, deskewed
 from robots.onboard.line_extraction import ExtractionConfig, extract
 from robots.onboard.line_filter import Evidence, LineFilter, MatchingConfig, MotionConfig, Sights, evidence, matched
 from vrs.checks import validated, within
-from vrs.mobile import advanced, wrapped
-from vrs.mobile.model import all_wrapped, sinc
+from vrs.mobile import advanced
+from vrs.mobile.model import all_wrapped
 from vrs.model import Array, frozen_array
 
 _BENT = 0.1
@@ -141,7 +141,6 @@ class Tracker:
         self.evidence = Evidence(0.0, 0.0, 0.0, 1.0)
         """How the last scan fits the map, beam by beam."""
         self._information = np.zeros((3, 3))
-        self._scanned = -math.inf
         self._places: deque[tuple[float, float, float]] = deque(maxlen=_REMEMBERED)
         """Where the last scans were taken."""
 
@@ -162,21 +161,14 @@ class Tracker:
 
     def move(self, time: float, reading: tuple[float, float, float]) -> None:
         """Take a reading of the odometry, in its own frame, θ counted on; one that isn't newer is no news."""
-        track = self.odometry
-        if time <= track.time:
-            return
-        before, was = track.newest, track.time
-        track.add(time, reading)
-        if before is None:
-            return
-        way, turn = step_between(before, reading)
-        self.filter.move(way, turn, time - was)
+        step = self.odometry.step(time, reading)
+        if step is not None:
+            self.filter.move(*step)
 
     def see(self, scan: LaserScan) -> bool:
         """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
-        if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
+        if not self.odometry.takes(scan):
             return False
-        self._scanned = scan.time
         self.points = points = deskewed(scan, self.odometry)
         lines, noise = extract(points, self._config.extraction, self.noise)
         if math.isfinite(noise):
@@ -242,14 +234,6 @@ class Tracker:
         return again
 
 
-def step_between(before: tuple[float, float, float], after: tuple[float, float, float]) -> tuple[float, float]:
-    """Length [m], negative backwards, and angle [rad] of the arc between two readings of the odometry."""
-    turn = wrapped(after[2] - before[2])
-    dx, dy = after[0] - before[0], after[1] - before[1]
-    middle = before[2] + 0.5 * turn
-    return (dx * math.cos(middle) + dy * math.sin(middle)) / sinc(0.5 * turn), turn
-
-
 _TURN, _ACROSS = 0.3, 0.3
 """The paper's lines correspond if they differ by no more [rad], [m]; it leaves this open, and what follows."""
 _ROUNDS = 20
@@ -311,23 +295,17 @@ class PaperLocalizer:
         """Where the robot is taken to be, (x, y, θ) [m, m, rad]."""
         self._extraction = ExtractionConfig()
         self.odometry = OdometryTrack()
-        self._scanned = -math.inf
 
     def move(self, time: float, reading: tuple[float, float, float]) -> None:
         """Take a reading of the odometry, in its own frame; one that isn't newer is no news."""
-        before = self.odometry.newest
-        if time <= self.odometry.time:
-            return
-        self.odometry.add(time, reading)
-        if before is not None:
-            way, turn = step_between(before, reading)
-            self.posture = advanced(self.posture, way, turn, 1.0)
+        step = self.odometry.step(time, reading)
+        if step is not None:
+            self.posture = advanced(self.posture, step.way, step.turn, 1.0)
 
     def see(self, scan: LaserScan) -> bool:
         """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
-        if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
+        if not self.odometry.takes(scan):
             return False
-        self._scanned = scan.time
         seen, _ = extract(deskewed(scan, self.odometry), self._extraction)
         for _ in range(_ROUNDS):
             placed = seen.moved(self.posture)

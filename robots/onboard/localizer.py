@@ -25,6 +25,7 @@ from robots.onboard.line_filter import evidence
 from robots.onboard.localization import LocalizationConfig, Tracker
 from robots.onboard.map_building import Surveyor
 from vrs.checks import validated, within
+from vrs.mobile.model import composed
 from vrs.model import Array, frozen_array
 
 UNKNOWN = frozen_array(np.diag([1e4, 1e4, 10.0]))
@@ -115,7 +116,7 @@ class Localizer:
         """What follows the robot; None before it was ever known where that is."""
         self._surveyor: Surveyor | None = None
         self._verdicts: deque[tuple[float, bool, bool]] = deque()
-        self._looked = self._since = self._scanned = -math.inf
+        self._looked = self._since = -math.inf
         self._good = 0
         self._candidates: tuple[Candidate, ...] = ()
         self.events: deque[Event] = deque(maxlen=_KEPT_EVENTS)
@@ -165,9 +166,8 @@ class Localizer:
 
     def see(self, scan: LaserScan) -> bool:
         """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
-        if scan.time <= self._scanned or not self.odometry.covers(scan.time, scan.end):
+        if not self.odometry.takes(scan):
             return False
-        self._scanned = scan.time
         tracker, surveyor = self.tracker, self._surveyor
         if tracker is not None:
             tracker.see(scan)
@@ -258,12 +258,6 @@ class Localizer:
         tracker.move(self.odometry.time, newest)
         tracker.noise = surveyor.noise
         self._found(tracker)
-
-
-def composed(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The posture in the world of what is at b in a frame that is at a."""
-    c, s = math.cos(a[2]), math.sin(a[2])
-    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], a[2] + b[2]
 
 
 def compounded(

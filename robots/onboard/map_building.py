@@ -29,7 +29,7 @@ from robots.onboard.line_filter import LineFilter, Sights
 from robots.onboard.localization import LocalizationConfig, Tracker
 from vrs.checks import validated, within
 from vrs.mobile import wrapped
-from vrs.mobile.model import all_wrapped
+from vrs.mobile.model import all_wrapped, placed, turned
 from vrs.model import Array, frozen_array
 
 _EXACT = 1e-12
@@ -252,21 +252,18 @@ class Surveyor:
         if self._lost():
             self._begin()
             return True
-        x, y, theta = here = self.posture
+        here = self.posture
         last = self._last
-        near = last is not None and math.dist(last[:2], here[:2]) < _WAY and abs(wrapped(theta - last[2])) < _TURN
+        near = last is not None and math.dist(last[:2], here[:2]) < _WAY and abs(wrapped(here[2] - last[2])) < _TURN
         if near or len(self._kept) >= MOST:
             return True
         self._last = here
-        self._headings.append(theta)
+        self._headings.append(here[2])
         points = self._builder.points
         assert points is not None
         step = max(1, math.ceil(len(points.beams) / BEAMS))
-        c, s = math.cos(theta), math.sin(theta)
-        turn = np.array([[c, s], [-s, c]])
-        self._kept.append(
-            (points.origins[::step] @ turn + (x, y), points.ways[::step] @ turn, points.ranges[::step])
-        )
+        origins, ways = placed(points.origins[::step], here), turned(points.ways[::step], here[2])
+        self._kept.append((origins, ways, points.ranges[::step]))
         return True
 
     def _lost(self) -> bool:

@@ -27,6 +27,7 @@ from robots.onboard.avoidance import Mounts, ObstacleAvoidance, Outline
 from robots.onboard.driving import IPR_LIMITS, Drive
 from vrs.checks import validated, within
 from vrs.mobile import DriveLimits, wrapped
+from vrs.mobile.model import composed
 from vrs.model import Array
 
 
@@ -178,15 +179,13 @@ class MoverTracker:
         closes = len(groups) > 1 and groups[0][0] == 0 and groups[-1][-1] == last
         if closes and abs(ranges[0] - ranges[last]) < self._config.together:
             groups = [groups[-1] + groups[0], *groups[1:-1]]
-        x, y, theta = posture
-        cos, sin = math.cos(theta), math.sin(theta)
         found = []
         for group in (part for together in groups for part in self._parts(together, ranges)):
             nearest = min(ranges[k] for k in group)
             places = self._mounts[[k for k in group if ranges[k] < nearest + self._config.radius]]
-            angle = theta + math.atan2(float(np.sin(places[:, 2]).sum()), float(np.cos(places[:, 2]).sum()))
+            angle = posture[2] + math.atan2(float(np.sin(places[:, 2]).sum()), float(np.cos(places[:, 2]).sum()))
             mx, my = places[:, :2].mean(axis=0).tolist()
-            found.append((nearest, angle, np.array([x + cos * mx - sin * my, y + sin * mx + cos * my])))
+            found.append((nearest, angle, np.array(composed(posture, (mx, my, 0.0))[:2])))
         return found
 
     def _parts(self, group: Sequence[int], ranges: Sequence[float]) -> list[Sequence[int]]:

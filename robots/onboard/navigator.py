@@ -22,7 +22,7 @@ from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, Yielding
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
 from robots.onboard.routes import RouteMap
 from vrs.mobile.environment import Grid
-from vrs.mobile.model import all_wrapped
+from vrs.mobile.model import all_wrapped, composed
 from vrs.model import Array
 
 CELL = 0.05
@@ -149,12 +149,11 @@ class Navigator:
     def _comes_near(self, ranges: Array, posture: Posture) -> NDArray[np.bool_]:
         """Which echoes come from where nothing stood before: of something that has come there."""
         found = np.isfinite(ranges)
-        x, y, theta = posture
-        c, s = math.cos(theta), math.sin(theta)
+        half = self._half_cone
         for k in np.flatnonzero(found).tolist():
-            mount, half = self._mounts[k], self._half_cone
-            bearing = theta + mount.angle + np.linspace(-half, half, 5)
-            at = x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y
+            mount = self._mounts[k]
+            *at, direction = composed(posture, (mount.x, mount.y, mount.angle))
+            bearing = direction + np.linspace(-half, half, 5)
             arc = at + (ranges[k] + _INSIDE) * np.column_stack([np.cos(bearing), np.sin(bearing)])
             found[k] = bool(self.obstacles.was_free(arc).all())
         return found
@@ -163,13 +162,11 @@ class Navigator:
         """Which echoes come from where something is known to be."""
         places = self._around(posture)
         found = np.zeros(len(ranges), bool)
-        x, y, theta = posture
-        c, s = math.cos(theta), math.sin(theta)
         for k in np.flatnonzero(ranges < self._range_max).tolist():
             mount = self._mounts[k]
-            dx, dy = (places - (x + c * mount.x - s * mount.y, y + s * mount.x + c * mount.y)).T
+            dx, dy = (places - composed(posture, (mount.x, mount.y, mount.angle))[:2]).T
             far = np.hypot(dx, dy)
-            aside = np.abs(all_wrapped(np.arctan2(dy, dx) - theta - mount.angle))
+            aside = np.abs(all_wrapped(np.arctan2(dy, dx) - posture.theta - mount.angle))
             near = np.abs(far - ranges[k]) < _EXPLAINED
             found[k] = bool((near & (aside < self._half_cone + 0.05)).any())
         return found

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robots.onboard.laser import LaserScan, OdometryTrack, beam_angles, deskewed
 from vrs.checks import validated, within
 from vrs.mobile.environment import Grid
-from vrs.mobile.model import all_wrapped
+from vrs.mobile.model import all_wrapped, placed
 from vrs.model import Array
 
 Bools = NDArray[np.bool_]
@@ -93,16 +93,15 @@ class ObstacleMap:
             posture: Where the robot is at the last of them, (x, y, θ) [m, m, rad].
         """
         points, now = deskewed(scan, odometry), odometry.time
-        x, y, theta = posture
-        turn = np.array([[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]])
-        origin = points.origins.mean(axis=0) if len(points.origins) else np.array([scan.forward, 0.0])
+        ahead = points.origins.mean(axis=0) if len(points.origins) else np.array([scan.forward, 0.0])
+        origin = placed(ahead, posture)
         count = len(scan.ranges)
         bearings = beam_angles(count)
         if len(points.beams):
             skewed = np.arctan2(points.ways[:, 1], points.ways[:, 0]) - bearings[points.beams]
             bearings = bearings + np.interp(np.arange(count), points.beams, skewed)
-        self._look_through(origin @ turn + (x, y), bearings + theta, _filled(scan.ranges, self._config.reach), now)
-        places = points.places @ turn + (x, y)
+        self._look_through(origin, bearings + posture[2], _filled(scan.ranges, self._config.reach), now)
+        places = placed(points.places, posture)
         near = (points.ranges < self._config.reach) & self._grid.inside(self._grid.index(places))
         new = np.zeros(len(places), bool)
         new[near] = ~self._knows(places[near])
@@ -111,7 +110,7 @@ class ObstacleMap:
         moving = np.zeros(len(places), bool)
         cells = self._grid.index(places[new])
         moving[new] = self._is_moving(now)[cells[:, 0], cells[:, 1]]
-        self._movers = self._grouped(places, points.beams, moving, origin @ turn + (x, y))
+        self._movers = self._grouped(places, points.beams, moving, origin)
 
     @property
     def movers(self) -> list[tuple[float, float]]:

@@ -23,10 +23,11 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from robots.onboard.avoidance import Mounts
+from robots.onboard.avoidance import Mounts, seen_from
 from vrs.checks import finite, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile.environment import Grid
+from vrs.mobile.model import placed
 from vrs.model import Array
 
 _NEVER = -math.inf
@@ -151,10 +152,7 @@ class EnvironmentSupervisor:
         self._drop(now)
         if not self._cells and not heard.any():
             return heard
-        x, y, theta = posture
-        cos, sin = math.cos(theta), math.sin(theta)
-        origins = self._mounts[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-        angles = self._mounts[:, 2] + theta
+        origins, angles = placed(self._mounts[:, :2], posture), self._mounts[:, 2] + posture[2]
         r = np.where(heard, np.maximum(r, config.range_min), config.range_max)
         sees = heard | (self._silent >= config.silence)
         self._look_through(origins[sees], angles[sees], r[sees], now)
@@ -194,7 +192,7 @@ class EnvironmentSupervisor:
         middle = origins.mean(axis=0)
         spread = float(np.abs(origins - middle).max()) * 2
         near = np.abs(self._walls - middle).max(axis=1) < float((r + self._tolerance(r)).max()) + half + spread
-        distance, along = _seen_from(origins, angles, self._walls[near])
+        distance, along = seen_from(origins, angles, self._walls[near])
         # As an angle, the cell reaches half its diagonal beyond the cone: cos(a + b), of a cone and of a cell.
         cone = config.half_cone + config.heading_error
         cell = np.minimum(half / np.maximum(distance, half), 1.0)
@@ -207,7 +205,7 @@ class EnvironmentSupervisor:
         config, half = self._config, self._grid.cell * math.sqrt(0.5)
         if not len(points) or not len(r):
             return np.zeros(len(points), bool)
-        distance, along = _seen_from(origins, angles, points)
+        distance, along = seen_from(origins, angles, points)
         inside = along >= math.cos(config.clear_cone * config.half_cone) * distance
         clear = inside & (distance + half < r - self._tolerance(r))
         return np.asarray(clear.any(axis=1))
@@ -249,10 +247,3 @@ class EnvironmentSupervisor:
             oldest = sorted(cells, key=lambda cell: cells[cell].seen)
             for cell in oldest[: len(cells) - config.most_kept]:
                 del cells[cell]
-
-
-def _seen_from(origins: Array, angles: Array, points: Array) -> tuple[Array, Array]:
-    """Distances of points (p, 2) from sonars (k, 2), and how far along where they look, (p, k) each."""
-    dx = points[:, :1] - origins[:, 0]
-    dy = points[:, 1:] - origins[:, 1]
-    return np.sqrt(dx * dx + dy * dy), dx * np.cos(angles) + dy * np.sin(angles)

@@ -242,13 +242,6 @@ class WatchdogConfig:
     window: Annotated[int, within(1, 1000000)] = 4096
     """How far a message may be overtaken and still count [messages], 1 to 1,000,000."""
 
-    def __post_init__(self) -> None:
-        for name, words in (("policy", LossPolicy), ("future", AcceptedFuture)):
-            try:
-                object.__setattr__(self, name, words(getattr(self, name)))
-            except ValueError:
-                raise InvalidValueError(name, getattr(self, name), f"one of {', '.join(words)}") from None
-
 
 class Watchdog:
     """Says which messages count, and when the robot has to stop.

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from operator import truediv
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from typing_extensions import override
 
 from robots.bullet.drives import Drives
 from robots.bullet.serial_arm import Payload, Reality, RigidLink, load_arm
@@ -22,7 +21,7 @@ from robots.onboard.servo import Servo, ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.dynamics import nominal_torques
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, DOF, FLANGE, POSES
-from robots.robot import Measured, Prepared
+from robots.robot import Closing, Measured, Prepared
 from vrs.checks import finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
@@ -57,7 +56,7 @@ def puma_links(payload: Payload | None = None) -> tuple[RigidLink, ...]:
     return tuple(links)
 
 
-class RealArm:
+class RealArm(Closing):
     """A simulated PUMA 560 in a PyBullet world of its own; use it as a context manager, or `close` it."""
 
     def __init__(
@@ -167,10 +166,10 @@ class RealArm:
 
     def follow(self, prepared: Prepared) -> Measured:
         """Follow references that `prepare` has made ready; returns and raises as `run`."""
-        client = self.world.client
+        bullet = self.world.bullet
         if self.reality.ideal:
             return self._follow(prepared)
-        bullet, body, drives, servo = self.world.bullet, self._body, self._drives, self._servo
+        body, drives, servo = self._body, self._drives, self._servo
         control, step, read = bullet.setJointMotorControlArray, bullet.stepSimulation, bullet.getJointStates
         mass_matrix, inverse_dynamics = bullet.calculateMassMatrix, bullet.calculateInverseDynamics
         torque_mode, passive, limited = bullet.TORQUE_CONTROL, drives.passive, self.reality.torque_limits
@@ -190,12 +189,12 @@ class RealArm:
                         saturated[j] += 1
             applied = tau
             if not passive:
-                M = mass_matrix(body, q, physicsClientId=client)
-                bias = inverse_dynamics(body, q, qd, _ZERO, physicsClientId=client)
+                M = mass_matrix(body, q)
+                bias = inverse_dynamics(body, q, qd, _ZERO)
                 applied = drives.joint_torques(M, bias, qd, tau)
-            control(body, _JOINTS, torque_mode, forces=applied, physicsClientId=client)
-            step(physicsClientId=client)
-            states = read(body, _JOINTS, physicsClientId=client)
+            control(body, _JOINTS, torque_mode, forces=applied)
+            step()
+            states = read(body, _JOINTS)
             q, qd = [s[0] for s in states], [s[1] for s in states]
             self._keep(q, qd)
             reading = self._read(q)
@@ -213,16 +212,14 @@ class RealArm:
             LostError: If the arm's state explodes.
         """
         torques = finite_array("tau", tau, (DOF,), "six finite joint torques [N m]").tolist()
-        bullet, client, body = self.world.bullet, self.world.client, self._body
+        bullet, body = self.world.bullet, self._body
         if not self._drives.passive:
-            M = bullet.calculateMassMatrix(body, self._q, physicsClientId=client)
-            bias = bullet.calculateInverseDynamics(body, self._q, self._qd, _ZERO, physicsClientId=client)
+            M = bullet.calculateMassMatrix(body, self._q)
+            bias = bullet.calculateInverseDynamics(body, self._q, self._qd, _ZERO)
             torques = self._drives.joint_torques(M, bias, self._qd, torques)
-        bullet.setJointMotorControlArray(
-            body, _JOINTS, bullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
-        )
-        bullet.stepSimulation(physicsClientId=client)
-        states = bullet.getJointStates(body, _JOINTS, physicsClientId=client)
+        bullet.setJointMotorControlArray(body, _JOINTS, bullet.TORQUE_CONTROL, forces=torques)
+        bullet.stepSimulation()
+        states = bullet.getJointStates(body, _JOINTS)
         self._keep([s[0] for s in states], [s[1] for s in states])
 
     def place(self, q: ArrayLike, qd: ArrayLike = _ZERO) -> None:
@@ -253,26 +250,18 @@ class RealArm:
             qdd: Joint accelerations [rad/s²], (6,).
         """
         rows = [_row(*item) for item in zip(("q", "qd", "qdd"), (q, qd, qdd), _BOUNDS, strict=True)]
-        tau = self.world.bullet.calculateInverseDynamics(self._body, *rows, physicsClientId=self.world.client)
+        tau = self.world.bullet.calculateInverseDynamics(self._body, *rows)
         return frozen_array(np.array(tau) + np.array(self._armature) * rows[2])
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """Return the joint-space inertia at q [rad], (6, 6) [kg m²]: true payload, rotors if it has any."""
         row = _row("q", q, _BOUNDS[0])
-        M = self.world.bullet.calculateMassMatrix(self._body, row, physicsClientId=self.world.client)
+        M = self.world.bullet.calculateMassMatrix(self._body, row)
         return frozen_array(np.array(M) + np.diag(self._armature))
 
+    @override
     def close(self) -> None:
-        """Disconnect the world; a second call does nothing."""
         self.world.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _follow(self, prepared: Prepared) -> Measured:
         q, qd, feedforward = prepared
@@ -308,7 +297,7 @@ class RealArm:
 
     def _set_state(self) -> None:
         for j, (x, v) in enumerate(zip(self._q, self._qd, strict=True)):
-            self.world.bullet.resetJointState(self._body, j, x, targetVelocity=v, physicsClientId=self.world.client)
+            self.world.bullet.resetJointState(self._body, j, x, targetVelocity=v)
 
 
 def _references(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> tuple[Array, Array, Array]:

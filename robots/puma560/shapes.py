@@ -16,8 +16,6 @@ import numpy as np
 from robots.puma560.parameters import A2, A3, D3, D4, FLANGE, PEDESTAL
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft, slab
 
-__all__ = ["LinkShape", "shapes"]
-
 CREAM: Final = (0.90, 0.88, 0.80)
 STEEL: Final = (0.62, 0.64, 0.67)
 DARK: Final = (0.16, 0.18, 0.21)

@@ -31,7 +31,7 @@ from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import load
-from robots.onboard import WatchdogConfig
+from robots.onboard.watchdog import WatchdogConfig
 from robots.robot import IDEAL
 
 ROBOT = load("puma560")

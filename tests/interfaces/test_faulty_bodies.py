@@ -16,7 +16,8 @@ from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
 from interfaces.teleop.halt import Halt, HaltCause
-from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
+from robots.onboard.following import FollowingAbort, SensorFault
+from robots.onboard.watchdog import StopReason, WatchdogConfig, WatchdogState
 from robots.robot import ExactArm, Prepared
 from tests.interfaces.test_host import READY, STEP, Ends, to
 from tests.interfaces.test_tick_loop import Bench, rows

@@ -12,7 +12,7 @@ from interfaces.messages.sites import Orders
 from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig, VirtualArm
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
-from robots.onboard import LossPolicy, WatchdogConfig
+from robots.onboard.watchdog import LossPolicy, WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
 from vrs.model import Array
 

@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 from interfaces.messages.control import PROTOCOL, Hello, Role
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import RobotSiteConfig
-from robots.onboard import LossPolicy, WatchdogConfig
+from robots.onboard.watchdog import LossPolicy, WatchdogConfig
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.teleop.rig import Rig
 from tests.interfaces.test_host import Ends

@@ -12,7 +12,7 @@ from interfaces.messages.sites import Orders
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
-from robots.onboard import WatchdogConfig
+from robots.onboard.watchdog import WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand
 
 MODEL = puma560.model()

@@ -15,7 +15,7 @@ from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, Virtu
 from interfaces.teleop.following_arm import ReceivedLog
 from interfaces.teleop.halt import Halt, HaltCause
 from robots import puma560
-from robots.onboard import WatchdogConfig
+from robots.onboard.watchdog import WatchdogConfig
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop
 from vrs.model import Array
 

@@ -8,7 +8,7 @@ import pytest
 from roboticstoolbox.models.DH import Puma560
 
 from robots.bullet import Payload, Reality, WorldClosedError
-from robots.onboard import ServoGains
+from robots.onboard.servo import ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.body import RealArm
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, FLANGE, default_limits
@@ -128,7 +128,7 @@ def test_a_payload_changes_hands_without_a_trace() -> None:
         arm.attach(Payload(1.0))
         arm.release()
         assert arm.payload is None
-        assert arm.world.bullet.getNumBodies(physicsClientId=arm.world.client) == 1
+        assert arm.world.bullet.getNumBodies() == 1
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -278,10 +278,10 @@ def test_no_reference_is_no_step() -> None:
 
 def test_a_closed_arm_has_given_its_client_back() -> None:
     with RealArm() as arm:
-        bullet, client = arm.world.bullet, arm.world.client
-        assert bullet.getConnectionInfo(client)["isConnected"] == 1
+        bullet = arm.world.bullet
+        assert bullet.getConnectionInfo()["isConnected"] == 1
     assert arm.closed
-    assert bullet.getConnectionInfo(client)["isConnected"] == 0
+    assert bullet.getConnectionInfo()["isConnected"] == 0
     arm.close()
     with pytest.raises(WorldClosedError):
         arm.apply(np.zeros(6))

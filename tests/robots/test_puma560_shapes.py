@@ -11,7 +11,8 @@ import trimesh
 
 from robots import puma560
 from robots.puma560.parameters import A2, D3, D4, FLANGE, PEDESTAL
-from robots.puma560.shapes import LinkShape, shapes
+from robots.puma560.shapes import shapes
+from robots.solids import LinkShape
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from robots.bullet import Payload, Reality
 from robots.bullet.drives import Drives, solve_six
-from robots.onboard import Servo, ServoGains
+from robots.onboard.servo import Servo, ServoGains
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 

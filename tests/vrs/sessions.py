@@ -13,6 +13,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from tests.vrs.laws import Columns, Figures, LawBrokenError, check_run, check_same, columns
 from tests.vrs.watch import Watch
 from vrs.clock import ManualClock
 from vrs.commands import (
@@ -40,7 +41,6 @@ from vrs.engine import Engine
 from vrs.errors import VrsError
 from vrs.ledger import Receipt
 from vrs.model import Array, RobotModel, frozen_array
-from vrs.testing import Columns, Figures, LawBrokenError, check_run, check_same, columns
 from vrs.timeline import Timeline
 
 Item = TypeVar("Item")

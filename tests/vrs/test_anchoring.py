@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from robots import puma560
+from tests.vrs.laws import Figures, check_run, columns
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Status, Timeline
 from vrs.anchoring import anchored
 from vrs.errors import InvalidValueError
-from vrs.testing import Figures, check_run, columns
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from robots import puma560
+from tests.vrs.laws import Figures
 from tests.vrs.sessions import Generator, Session
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, SteerCommand, Timeline, archive, tree
 from vrs.archive import Keeper, StoredLeaf, StoredNode
 from vrs.codec import from_msgpack, to_msgpack
 from vrs.segment import Piece
-from vrs.testing import Figures
 
 MODEL = puma560.model()
 N = 3

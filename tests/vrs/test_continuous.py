@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import puma560
+from tests.vrs.laws import Figures, check_run, check_way, columns
 from tests.vrs.watch import Watch
 from vrs import (
     Cancel,
@@ -30,7 +31,6 @@ from vrs import (
     Stop,
 )
 from vrs.planning.path import rotations
-from vrs.testing import Figures, check_run, check_way, columns
 
 MODEL = puma560.model()
 LIMITS = MODEL.limits

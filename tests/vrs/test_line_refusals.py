@@ -9,7 +9,8 @@ from robots import puma560
 from vrs import Profile
 from vrs.errors import PlanningError
 from vrs.model import Limits, RobotModel
-from vrs.planning.line import line, obstacle, smooth_stop
+from vrs.planning.jerk_limited import stop
+from vrs.planning.line import line, obstacle
 from vrs.planning.path import Course, rotation_vector, rotations, trace
 from vrs.planning.plan import Plan, end_state
 from vrs.segment import State, evaluate
@@ -158,13 +159,13 @@ def test_a_line_that_begins_near_a_singularity_may_not_come_nearer():
 def test_a_smooth_stop_ends_at_rest_whichever_way_the_arm_accelerates(rate: float, growth: float):
     q = np.array([0.2, 0.8, -2.2, 0.3, 0.2, -0.4])
     state = State(q, rate * LIMITS.qd_max, growth * LIMITS.qdd_max)
-    stop = smooth_stop(state, LIMITS)
-    assert stop is not None
-    if len(stop):
-        end = end_state(stop)
+    plan, notes = stop(state, Profile.JERK_LIMITED, LIMITS)
+    assert notes == ()
+    if len(plan):
+        end = end_state(plan)
         assert np.abs(end.qd).max() < 1e-12
         assert np.abs(end.qdd).max() < 1e-9
-        assert np.array_equal(stop.coefficients[0, :3], [q, state.qd, 0.5 * state.qdd])
+        assert np.array_equal(plan.coefficients[0, :3], [q, state.qd, 0.5 * state.qdd])
 
 
 def test_another_configuration_is_refused_and_the_same_isn_t():

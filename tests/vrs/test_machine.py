@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from robots import puma560
+from tests.vrs.laws import Figures
 from tests.vrs.sessions import Session, lines_are_planned
 from vrs import Timeline
-from vrs.testing import Figures
 
 EDITS = int(os.environ.get("VRS_SOAK_EDITS", "0"))
 STEPS = 12

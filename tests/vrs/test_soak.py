@@ -19,10 +19,10 @@ from rich.progress import Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from robots import puma560
+from tests.vrs.laws import BOUNDS, Figures, LawBrokenError
 from tests.vrs.sessions import Generator, Session, lines_are_planned
 from vrs import Status
 from vrs.errors import VrsError
-from vrs.testing import BOUNDS, Figures, LawBrokenError
 
 EDITS = int(os.environ.get("VRS_SOAK_EDITS", "3000"))
 SEED = int(os.environ.get("VRS_SOAK_SEED", "4"))

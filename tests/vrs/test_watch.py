@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from robots import puma560
+from tests.vrs.laws import BOUNDS, Figures, LawBrokenError, check_run, columns, extremes
 from tests.vrs.watch import Watch
 from vrs import (
     Cancel,
@@ -31,7 +32,6 @@ from vrs import (
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.scheduler import Scheduler
 from vrs.segment import Piece
-from vrs.testing import BOUNDS, Figures, LawBrokenError, check_run, columns, extremes
 
 MODEL = puma560.model()
 A = np.array([0.0, 0.8, -2.4, 0.0, 0.6, 0.0])

@@ -13,6 +13,24 @@ from math import inf
 
 import numpy as np
 
+from tests.vrs.laws import (
+    Columns,
+    Figures,
+    LawBrokenError,
+    changed,
+    check_memory,
+    check_moves,
+    check_names,
+    check_pace,
+    check_past,
+    check_receipts,
+    check_rest,
+    check_run,
+    check_same,
+    check_tail,
+    check_way,
+    columns,
+)
 from vrs.commands import (
     Cancel,
     Command,
@@ -35,24 +53,6 @@ from vrs.errors import VrsError
 from vrs.ledger import Receipt, Status
 from vrs.notes import NoteCode, is_rough
 from vrs.segment import HOLD
-from vrs.testing import (
-    Columns,
-    Figures,
-    LawBrokenError,
-    changed,
-    check_memory,
-    check_moves,
-    check_names,
-    check_pace,
-    check_past,
-    check_receipts,
-    check_rest,
-    check_run,
-    check_same,
-    check_tail,
-    check_way,
-    columns,
-)
 from vrs.timeline import Timeline
 
 

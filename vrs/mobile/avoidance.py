@@ -20,8 +20,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from vrs.checks import positive, validated
-from vrs.errors import InvalidValueError
+from vrs.checks import positive, validated, within
 from vrs.mobile.environment import Grid, cast
 from vrs.mobile.model import DriveLimits, braking, clipped, limited, on_arcs, wrapped
 from vrs.model import Array
@@ -49,7 +48,7 @@ class Avoidance:
     """Of the circle about the reference point that must stay free [m]; the robot's own, with whatever margin."""
     period: Annotated[float, positive()] = 0.1
     """T: time between commands [s]."""
-    sectors: int = 72
+    sectors: Annotated[int, within(8, 100_000)] = 72
     """Directions that are looked in, all around: 5 deg each, as in the source."""
     notice: Annotated[float, positive()] = 1.0
     """How far ahead a sector must be free, beyond the radius, not to count as blocked [m]."""
@@ -57,12 +56,8 @@ class Avoidance:
     """Time after which the operator's arc shows where it is to go [s]."""
     gain: Annotated[float, positive()] = 2.0
     """Angular speed for each radian between the robot's direction and the one that's taken [1/s]."""
-    shares: int = 4
+    shares: Annotated[int, within(1, 1000)] = 4
     """Slower commands on the same arc that are tried before it brakes."""
-
-    def __post_init__(self) -> None:
-        if self.sectors < 8 or self.shares < 1:
-            raise InvalidValueError("sectors, shares", (self.sectors, self.shares), "at least 8 and 1")
 
     def command(
         self,

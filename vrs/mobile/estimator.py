@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError
-from vrs.mobile.model import advanced, wrapped
+from vrs.mobile.model import advanced, composed, wrapped
 from vrs.model import Array, frozen_array
 
 HISTORY = 8192
@@ -201,10 +201,7 @@ class PostureEstimator:
         self._settle()
         if self._known == self.count:
             return self._corrected(self._entries[-1])[0]
-        x, y, theta = self._entries[-1 - (self.count - self._known)].estimate
-        dx, dy, turn = self._ahead
-        c, s = cos(theta), sin(theta)
-        return x + c * dx - s * dy, y + s * dx + c * dy, theta + turn
+        return composed(self._entries[-1 - (self.count - self._known)].estimate, self._ahead)
 
     def _settle(self) -> None:
         """Make the estimates anew that feedback has changed."""

@@ -207,6 +207,24 @@ def rotation(theta: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def turned(vectors: Array, theta: float) -> Array:
+    """Vectors of a robot's axes in the world's, (k, 2) or (2,), where the robot heads in θ [rad]."""
+    c, s = cos(theta), sin(theta)
+    found: Array = vectors @ np.array([[c, s], [-s, c]])
+    return found
+
+
+def placed(points: Array, posture: tuple[float, float, float]) -> Array:
+    """Points of a robot's frame in the world's [m], (k, 2) or (2,), where the robot is at a posture."""
+    return turned(points, posture[2]) + posture[:2]
+
+
+def composed(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The posture in the world of what is at b in a frame that is at a."""
+    c, s = cos(a[2]), sin(a[2])
+    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], a[2] + b[2]
+
+
 def increment(v: float, w: float, duration: float) -> tuple[float, float, float]:
     """H(v, ω): an exact arc's displacement in the robot's axes at its start [m, m, rad].
 

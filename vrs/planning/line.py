@@ -27,6 +27,7 @@ from vrs.planning import parabolic
 from vrs.planning.along import Samples, Traversal, sampled
 from vrs.planning.certificate import violation
 from vrs.planning.jerk_limited import rest_to_rest as smooth_rest_to_rest
+from vrs.planning.jerk_limited import stop
 from vrs.planning.path import (
     DERIVATIVES,
     NODES,
@@ -39,7 +40,7 @@ from vrs.planning.path import (
     trace,
     turning,
 )
-from vrs.planning.plan import Plan, empty, end_state, integrate
+from vrs.planning.plan import Plan, empty, end_state
 from vrs.segment import State
 
 _TIMES: Final = (0.3, 0.5, 0.75, 1.0, 1.4, 2.0, 3.0)
@@ -193,28 +194,6 @@ def _fits(course: Course, b: float, state: State, model: RobotModel, limits: Lim
         bool((np.abs(DERIVATIVES[k] @ q) <= (1.0 + 1e-6) * bounds[k] * (0.5 * b) ** (k + 1)).all())
         for k in range(3 if smooth else 2)
     )
-
-
-def smooth_stop(state: State, limits: Limits) -> Plan | None:
-    """Each joint to rest as fast as its acceleration and jerk limits allow; None where that passes a limit."""
-    v, a, top, J = state.qd, state.qdd, limits.qdd_max, limits.qddd_max
-    # Where the speed would end if the acceleration went to zero at once tells which way to accelerate.
-    sign = np.where(v + a * np.abs(a) / (2.0 * J) > 0, -1.0, 1.0)
-    v, a = v * sign, a * sign
-    peak = np.sqrt(np.maximum(0.5 * a * a - J * v, 0.0))
-    peak = np.minimum(peak, top)
-    rise, fall = np.maximum(peak - a, 0.0) / J, peak / J
-    steady = np.maximum(-v - (2.0 * peak * peak - a * a) / (2.0 * J), 0.0)
-    steady = np.where(peak > 0, steady / np.where(peak > 0, peak, 1.0), 0.0)
-    ends = np.cumsum([rise, steady, fall], axis=0)
-    knots = np.unique(np.concatenate([[0.0], ends.ravel()]))
-    knots = knots[np.concatenate([[True], np.diff(knots) > 1e-12])]
-    if len(knots) < 2:
-        return empty(len(v))
-    middle = 0.5 * (knots[1:] + knots[:-1])[:, None]
-    jerk = np.where(middle < ends[0], J, np.where((middle > ends[1]) & (middle < ends[2]), -J, 0.0)) * sign
-    plan = integrate(state, np.diff(knots), jerk, 3)
-    return plan if violation(plan, limits, jerk=True) is None else None
 
 
 SINGULAR: Final = 100.0
@@ -391,9 +370,9 @@ def line(
     blended = _blended(state, task)
     if blended is not None:
         return blended
-    stop, notes = _stopped(state, task)
-    plan, more = _from_rest(end_state(stop).q if len(stop) else state.q, task)
-    return stop.then(plan), (*notes, *more)
+    braking, notes = _stopped(state, task)
+    plan, more = _from_rest(end_state(braking).q if len(braking) else state.q, task)
+    return braking.then(plan), (*notes, *more)
 
 
 def _proper(X: Array) -> Array:
@@ -572,15 +551,9 @@ def _met(course: Course) -> str:
 
 def _stopped(state: State, task: _Task) -> tuple[Plan, Notes]:
     """Brake, with bounded jerk where that's asked for and goes."""
-    limits = task.limits
-    notes: Notes = (Note(NoteCode.BRAKED_BEFORE_LINE),)
-    if task.profile is Profile.JERK_LIMITED:
-        smooth = smooth_stop(state, limits)
-        if smooth is not None:
-            return smooth, notes
-        notes = (*notes, Note(NoteCode.NO_SMOOTH_STOP_BEFORE_LINE))
-    stop = parabolic.brake(state, limits)
-    problem = violation(stop, limits, jerk=False)
+    plan, rough = stop(state, task.profile, task.limits)
+    problem = violation(plan, task.limits, jerk=task.profile is Profile.JERK_LIMITED and not rough)
     if problem is not None:
         raise PlanningError(f"no stop before the line: {problem}")
-    return stop, notes
+    notes: Notes = (Note(NoteCode.BRAKED_BEFORE_LINE),)
+    return plan, (*notes, Note(NoteCode.NO_SMOOTH_STOP_BEFORE_LINE)) if rough else notes

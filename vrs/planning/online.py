@@ -63,7 +63,7 @@ class Cubics(NamedTuple):
                 kept = abs(peak) <= bound.qd_max[joint] * (1.0 + TOLERANCE)
             else:
                 lowest, highest = bound.lowest[joint], bound.highest[joint]
-                turns = [u for u in _roots(0.5 * qddd, qdd, qd) if 0.0 < u < h]
+                turns = [u for u in roots(0.5 * qddd, qdd, qd) if 0.0 < u < h]
                 kept = all(lowest <= q + u * (qd + u * (0.5 * qdd + u * qddd / 6.0)) <= highest for u in turns)
             if not kept:
                 return False
@@ -112,7 +112,7 @@ def integrated(state: State, h: Array, jerk: Array) -> Cubics:
     return Cubics(h, points)
 
 
-def _roots(a: float, b: float, c: float) -> list[float]:
+def roots(a: float, b: float, c: float) -> list[float]:
     """Real roots of a u² + b u + c, a = 0 included."""
     square = b * b - 4.0 * a * c
     if square < 0.0:

@@ -447,9 +447,6 @@ def _least_time(move: ParabolicMove, limits: Limits, b: Array) -> ParabolicTimes
     return ParabolicTimes(float(T[i]), float(b[i]), float(L[i]))
 
 
-__all__ = ["NEGLIGIBLE", "blend", "brake", "from_rest", "rest_to_rest", "to_rest"]
-
-
 def to_rest(state: State, q: Array, speed: float, limits: Limits) -> Plan:
     """Plan from any state to rest at q, all joints arriving together.
 

@@ -189,48 +189,25 @@ class Tooled:
     """Pose of the tool in the frame of the last link, (4, 4)."""
     to_link: Array
     """Pose of the last link in the tool's frame, (4, 4)."""
-
-    @property
-    def name(self) -> str:
-        """The arm's."""
-        return self.arm.name
-
-    @property
-    def limits(self) -> Limits:
-        """The arm's."""
-        return self.arm.limits
-
-    @property
-    def prismatic(self) -> Collection[int]:
-        """The arm's."""
-        return self.arm.prismatic
-
-    @property
-    def poses(self) -> Mapping[str, Array]:
-        """The arm's named joint positions, each (n,) [rad]."""
-        return self.arm.poses
-
-    @property
-    def tool_speed(self) -> float:
-        """Nominal linear speed of the tool [m/s]."""
-        return self.arm.tool_speed
-
-    @property
-    def tool_turn_speed(self) -> float:
-        """Nominal angular speed of the tool [rad/s]."""
-        return self.arm.tool_turn_speed
-
-    @property
-    def characteristic_length(self) -> float:
-        """The arm's [m]."""
-        return self.arm.characteristic_length
+    name: str
+    """This and what follows are the arm's."""
+    limits: Limits
+    prismatic: Collection[int]
+    poses: Mapping[str, Array]
+    """Named joint positions, each (n,) [rad]."""
+    tool_speed: float
+    """Nominal linear speed of the tool [m/s]."""
+    tool_turn_speed: float
+    """Nominal angular speed of the tool [rad/s]."""
+    characteristic_length: float
+    """[m]."""
 
     def forward(self, q: ArrayLike) -> Array:
         """Pose of the tool in the base frame, (4, 4), or (k, 4, 4) for q of shape (k, n)."""
         return self.arm.forward(q) @ self.tool
 
     def links(self, q: ArrayLike) -> Array:
-        """See `RobotModel.links`: of the arm alone."""
+        """Poses of base and links: of the arm alone."""
         return self.arm.links(q)
 
     def jacobian(self, q: ArrayLike) -> Array:
@@ -245,11 +222,11 @@ class Tooled:
         return self.arm.inverse(np.asarray(X) @ self.to_link, within_limits)
 
     def inverse_near(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
-        """See `RobotModel.inverse_near`; X is a pose of the tool."""
+        """The solution of a pose of the tool that is nearest to q."""
         return self.arm.inverse_near(np.asarray(X) @ self.to_link, q, configuration)
 
     def follow(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
-        """See `RobotModel.follow`; X are poses of the tool."""
+        """Solutions of poses of the tool in a row, (k, 4, 4), that go on from q."""
         return self.arm.follow(np.asarray(X) @ self.to_link, q, configuration)
 
     def configuration(self, q: ArrayLike) -> str:
@@ -267,7 +244,10 @@ def tooled(model: RobotModel, tool: Array | None) -> RobotModel:
     there, back = np.eye(4), np.eye(4)
     there[:3, :3], there[:3, 3] = R, p
     back[:3, :3], back[:3, 3] = R.T, -R.T @ p
-    return Tooled(model, there, back)
+    return Tooled(
+        model, there, back, model.name, model.limits, model.prismatic, model.poses, model.tool_speed,
+        model.tool_turn_speed, model.characteristic_length,
+    )  # fmt: skip
 
 
 def bare(model: RobotModel) -> RobotModel:

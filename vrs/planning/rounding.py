@@ -6,7 +6,6 @@ to brake, as far as the limits allow.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -19,7 +18,7 @@ from vrs.model import Array, Limits, RobotModel
 from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.plan import Plan, end_state
-from vrs.segment import evaluate
+from vrs.segment import evaluate, shifted
 
 _REST = 1e-9
 """Speed [rad/s] and distance from the via [rad] that count as none."""
@@ -96,15 +95,7 @@ def _add(row: Array, plan: Plan, knots: list[float], start: float, middle: float
     """Add the plan's polynomial at the middle of an interval, in powers of the time since the interval's start."""
     index = sum(knot <= middle for knot in knots[1:-1])
     a, shift = plan.coefficients[index], start - knots[index]
-    row[: len(a)] += a if abs(shift) <= _SAME_KNOT else _shift(len(a), shift) @ a
-
-
-def _shift(order: int, u: float) -> Array:
-    """Matrix of Taylor's shift of ascending powers by u."""
-    powers = [u**k for k in range(order)]
-    return np.array(
-        [[math.comb(i, k) * powers[i - k] if i >= k else 0.0 for i in range(order)] for k in range(order)]
-    )
+    row[: len(a)] += a if abs(shift) <= _SAME_KNOT else shifted(a, shift)
 
 
 Pair: TypeAlias = Callable[[Limits], tuple[Plan, Plan, Notes]]

@@ -28,6 +28,7 @@ from vrs.errors import InvalidValueError, PlanningError
 from vrs.model import Array, Limits, RobotModel, for_people
 from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
+from vrs.planning.online import roots
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, empty, packed
 from vrs.segment import State
@@ -106,7 +107,7 @@ def run(x: Moving, profile: JerkProfile) -> tuple[Moving, float, float]:
         half = 0.5 * j
         # The rate may pass through zero unseen twice, if the acceleration changes its sign.
         if v * v_after <= 0.0 or a * after < 0.0:
-            for t in _zeros(v, a, half):
+            for t in roots(half, a, v):
                 if 0.0 < t < h:
                     turn = q + t * (v + t * (0.5 * a + t * half / 3.0))
                     low, high = min(low, turn), max(high, turn)
@@ -114,15 +115,6 @@ def run(x: Moving, profile: JerkProfile) -> tuple[Moving, float, float]:
         v, a = v_after, after
         low, high = min(low, q), max(high, q)
     return (q, v, a), low, high
-
-
-def _zeros(c: float, b: float, a: float) -> tuple[float, ...]:
-    """Roots of c + b t + a t², computed stably."""
-    inside = b * b - 4.0 * a * c
-    if inside < 0.0:
-        return ()
-    big = -0.5 * (b + (sqrt(inside) if b >= 0 else -sqrt(inside)))
-    return ((c / big,) if big else ()) + ((big / a,) if a else ())
 
 
 def one_joint(

@@ -35,8 +35,8 @@ from interfaces.teleop import OperatorSiteConfig
 from interfaces.teleop.halt import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
-from robots.onboard import LossPolicy
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
+from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
 from vrs.clock import WallClock, seconds_since_1970
 from vrs.errors import VrsError

@@ -27,10 +27,10 @@ from interfaces.teleop.following_base import DrivenConfig, DrivenHost, Following
 from robots.bullet.rooms import Room
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import MobileRobot
-from robots.onboard import WatchdogConfig
 from robots.onboard.driving import Posture
 from robots.onboard.following import SoundPosition
 from robots.onboard.laser import LaserModel
+from robots.onboard.watchdog import WatchdogConfig
 from robots.robot import Robot
 from vrs.checks import one_of
 from vrs.clock import WallClock

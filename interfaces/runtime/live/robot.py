@@ -20,7 +20,7 @@ from interfaces.stream.access import Access, bearer
 from interfaces.stream.codec import Value
 from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
-from robots.onboard import WatchdogConfig
+from robots.onboard.watchdog import WatchdogConfig
 from vrs.clock import WallClock
 from vrs.model import Array
 

@@ -18,7 +18,7 @@ from interfaces.messages.sites import Report
 from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.teleop.connection import SiteLine
-from robots.onboard import LossPolicy
+from robots.onboard.watchdog import LossPolicy
 from vrs.clock import Clock
 from vrs.errors import VrsError
 

@@ -18,7 +18,7 @@ from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
 from interfaces.teleop.connection import Host
-from robots.onboard import LossPolicy
+from robots.onboard.watchdog import LossPolicy
 from vrs.checks import one_of
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError

@@ -10,7 +10,7 @@ from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.server import HubServer, application
 from interfaces.stream.sockets import bind, serve
 from robots import puma560
-from robots.onboard import Lease, LeaseConfig
+from robots.onboard.lease import Lease, LeaseConfig
 from tests.interfaces.stream.serving import Serving, beside
 from vrs import Engine, ManualClock
 from vrs.clock import WallClock

@@ -19,8 +19,8 @@ from interfaces.stream.meshcat.newest import MOST_READERS, Newest, set_transform
 from interfaces.stream.meshcat.objects import module
 from robots import load, puma560
 from robots.puma560.parameters import FLANGE
-from robots.puma560.shapes import LinkShape
 from robots.robot import Robot
+from robots.solids import LinkShape
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Timeline
 from vrs.errors import InvalidValueError
 from vrs.model import Array

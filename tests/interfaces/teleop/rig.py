@@ -20,10 +20,10 @@ from robots import ipr
 from robots.ipr.parameters import IPR
 from robots.mobile.position import FusedPosition
 from robots.mobile.robot import BareBody
-from robots.onboard import WatchdogConfig
 from robots.onboard.driving import IPR_LIMITS, Posture
 from robots.onboard.journey import Journey
 from robots.onboard.routes import RouteConfig, RouteMap
+from robots.onboard.watchdog import WatchdogConfig
 
 TURN = 0.01
 CONTROL = 5

@@ -135,11 +135,8 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
     assert part.limits == model.limits
     # PyBullet has what it was given: it drops inertias silently when a call names damping, too.
     with MobileBody(chassis, START, senses=BLIND) as robot:
-        bullet, client = robot.world.bullet, robot.world.client
-        told = [
-            bullet.getDynamicsInfo(robot.body_id, j, physicsClientId=client)
-            for j in range(-1, bullet.getNumJoints(robot.body_id, physicsClientId=client))
-        ]
+        bullet = robot.world.bullet
+        told = [bullet.getDynamicsInfo(robot.body_id, j) for j in range(-1, bullet.getNumJoints(robot.body_id))]
     assert sum(row[0] for row in told) == pytest.approx(total, rel=1e-9)
     assert sorted(told[0][2]) == pytest.approx(sorted(np.linalg.eigvalsh(inertia)), rel=1e-9)
     spin = part.wheel_mass * part.wheel_radius**2 / 2 + part.gear**2 * part.rotor
@@ -152,8 +149,8 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
 def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(chassis: Chassis) -> None:
     with MobileBody(chassis, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.3, 0.0, 480)
-        bullet, client = body.world.bullet, body.world.client
-        points = bullet.getContactPoints(bodyA=body.body_id, physicsClientId=client)
+        bullet = body.world.bullet
+        points = bullet.getContactPoints(bodyA=body.body_id)
         weight = body.chassis.mass * 9.81
         assert sum(point[9] for point in points) == pytest.approx(weight, rel=0.01)
         assert sum(wheel.load for wheel in body.wheels) > 0.6 * weight

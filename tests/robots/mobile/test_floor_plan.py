@@ -110,7 +110,7 @@ def test_pybullet_sees_the_same(name: str) -> None:
         bodies = RoomBodies(world, room)
         for t in (0.0, 6.0, 20.0):
             bodies.at(t)
-            world.bullet.performCollisionDetection(physicsClientId=world.client)
+            world.bullet.performCollisionDetection()
             origins, ways = rays(rng, room, 400)
             free = ~inside(room, origins, t)
             exact = plan.cast(origins[free], ways[free], t, 3.0)

@@ -7,8 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import ipr
-from robots.onboard import AvoidanceConfig, PathFollowingConfig, TrackingConfig
+from robots.onboard.avoidance import AvoidanceConfig
 from robots.onboard.driving import IPR_LIMITS, kept
+from robots.onboard.path_following import PathFollowingConfig
+from robots.onboard.trajectory_tracking import TrackingConfig
 from tests.robots.onboard.rooms import IPR, ring
 from vrs.mobile import DriveLimits
 

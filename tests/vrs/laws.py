@@ -2,8 +2,6 @@
 
 Some edits keep the way and change when it's gone. Receipts are true, name what they should, and nothing else
 changes them. Limits are judged by exact extremes of polynomials, apart from the certificates of planning.
-
-One concept in over 600 lines: the laws, and the figures that judge them.
 """
 
 from __future__ import annotations
