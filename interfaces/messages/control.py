@@ -6,7 +6,7 @@ Frozen values, like those of `interfaces.messages`. Times are session times: the
 from __future__ import annotations
 
 import enum
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -315,6 +315,10 @@ class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 
 
 Positive = Annotated[float, Meta(gt=0, le=1e9)]
+
+
+HOLDS: Final = 0.3
+"""A drive order counts for so long after it was issued [s]: who says nothing more stops."""
 
 
 class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
