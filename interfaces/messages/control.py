@@ -384,6 +384,8 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
     """Of a mobile robot: what it does with the operator's path, by name."""
     room: Word = ""
     """Of a mobile robot: name of the room that it drives in."""
+    estimates: bool = False
+    """Of a mobile robot: whether its virtual one is drawn where the posture estimator has it."""
 
 
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):

@@ -78,7 +78,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         self.sight: SensedPoints | None = None
         """What it saw last."""
         self.estimating = False
-        """Whether the real robot's architecture has a posture estimator, see `ESTIMATING`."""
+        """Whether the real robot's architecture has a posture estimator, see `Architecture.estimates`."""
         self._errands: Outgoing[Errand] = Outgoing()
         self._later: tuple[tuple[float, tuple[RobotTask, ...]], ...] = ()
         """What it's to be told when the next drive has begun, and when that was given [s]."""

@@ -19,7 +19,7 @@ from interfaces.runtime.live.twins import LiveTwins
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.architectures import OperatorSurroundings
-from interfaces.teleop.architectures.compositions import ESTIMATING, grid_of, operator_surroundings
+from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
@@ -172,7 +172,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
 
     @override
     def draw(self, attached: Attached | None, *, now: float) -> None:
-        self.operator.robot.estimating = attached is not None and attached.architecture in ESTIMATING
+        self.operator.robot.estimating = attached is not None and attached.estimates
         self._follow()
         if not self.scene.readers:
             return
