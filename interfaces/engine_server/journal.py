@@ -9,10 +9,14 @@ from functools import cached_property
 from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
 
-from interfaces.messages import Change, History
+import msgspec
+
+from interfaces.messages import Change, History, Order, Outcome, RefusalCode
+from interfaces.messages.commands import portable
+from interfaces.messages.fields import MOST_NAMES
 from vrs.commands import Command
 from vrs.engine import Engine
-from vrs.errors import InvalidValueError, UnknownCommandError
+from vrs.errors import InvalidValueError, UnknownCommandError, VrsError
 from vrs.ledger import Receipt, Status
 from vrs.segment import HOLD, Piece
 from vrs.timeline import BaseTimeline, Timeline
@@ -223,6 +227,24 @@ class Journal:
         # It's done: from here on nothing may raise.
         self._done = result if isinstance(result, Receipt) else None
         return self._done
+
+    def carry_out(self, order: Order, *, now: float) -> Outcome:
+        """Let the engine carry out a client's order, see `interfaces.engine_server.servlet.Commander`."""
+        engine = self.engine
+        try:
+            why = engine.undo_refusal() if order.command is None else ""
+            receipt = self.execute(order.command)
+        except VrsError as error:
+            return Outcome(order.number, now, None, str(error))
+        if receipt is None:
+            return Outcome(order.number, now, None, why)
+        known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
+        code = known if isinstance(known, RefusalCode) else RefusalCode.OTHER
+        try:
+            receipt = portable(receipt, MOST_NAMES)
+        except Exception:  # noqa: BLE001 - the command is carried out, whatever keeps the others from being named
+            receipt = msgspec.structs.replace(receipt, shifted_names=(), superseded_names=())
+        return Outcome(order.number, now, receipt, code=code)
 
     def look(self) -> int:
         """Write down what was done to the engine, here or by others; the number of the newest edit."""

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-
-import msgspec
+from typing import Protocol
 
 from interfaces.engine_server.broadcast import DUE, MOST_VIEWERS, Broadcaster, CompactSlot, FrameSlot
 from interfaces.engine_server.forecasts import Forecasts
@@ -26,7 +25,6 @@ from interfaces.messages import (
     Outcome,
     Pulse,
     Refusal,
-    RefusalCode,
     Reply,
     Request,
     Scene,
@@ -36,8 +34,7 @@ from interfaces.messages import (
 from interfaces.messages.commands import portable
 from interfaces.messages.fields import MOST_NAMES
 from vrs.engine import Engine
-from vrs.errors import InvalidValueError, VrsError
-from vrs.ledger import Status
+from vrs.errors import InvalidValueError
 from vrs.model import frozen_array
 from vrs.timeline import Timeline
 
@@ -51,6 +48,22 @@ PULSE = 0.1
 """Period at which a follower of segments is told how far the timeline is complete [s]."""
 
 
+class Commander(Protocol):
+    """Who carries out what clients order: an engine's journal, or a mobile robot that is driven live."""
+
+    @property
+    def engine(self) -> Engine:
+        """What the commands are given to."""
+
+    def carry_out(self, order: Order, *, now: float) -> Outcome:
+        """Carry out an order whose turn it is.
+
+        Args:
+            order: What is ordered.
+            now: The engine's time [s].
+        """
+
+
 class Servlet:
     """Carries out a client's orders once each, in their order, and answers what it asks.
 
@@ -59,7 +72,7 @@ class Servlet:
 
     def __init__(
         self,
-        source: Engine | Journal,
+        source: Engine | Commander,
         *,
         lead: float = 0.0,
         broadcasters: Sequence[Broadcaster] = (),
@@ -68,18 +81,100 @@ class Servlet:
         """Serve one client.
 
         Args:
-            source: The engine, or its journal where others serve it too.
+            source: The engine, or its journal where others serve it too; or who else carries out orders, of whom
+                there's nothing to ask.
             lead: How far ahead of the engine's time answers to `Ask(None)` are [s].
             broadcasters: Where followers of frames find them.
             admit: Says why an order isn't carried out when its turn comes; None where it is.
         """
         self._admit = admit
-        self.journal = source if isinstance(source, Journal) else Journal(source)
-        self.lead = lead
-        self._broadcasters = tuple(broadcasters)
+        self._commander = Journal(source) if isinstance(source, Engine) else source
         self.outbox: deque[Reply] = deque(maxlen=OUTBOX)
         """What is sent next."""
         self.orders = OrderBook(self._carry_out, self.outbox.append)
+        self.timeline = (
+            ServedTimeline(self._commander, self.outbox, self.orders.outcomes, lead, broadcasters)
+            if isinstance(self._commander, Journal)
+            else None
+        )
+        """What the client sees of the timeline; None where none is to be followed."""
+
+    def receive(self, message: Request, *, now: float) -> None:
+        """Take a message of the client.
+
+        Args:
+            message: What has arrived.
+            now: The engine's time [s].
+
+        Raises:
+            InvalidValueError: If it's no request, or asks for a timeline where there's none.
+        """
+        timeline = self.timeline
+        if timeline is not None:
+            timeline.look(now=now)
+        if isinstance(message, Order):
+            self.orders.take(message, now)
+        elif timeline is None:
+            raise InvalidValueError("message", message, "an Order: there's no timeline to follow")
+        else:
+            timeline.receive(message, now=now)
+        if timeline is not None:
+            timeline.look(now=now)
+
+    def advance(self, *, now: float) -> tuple[Reply, ...]:
+        """What is to be sent to the client.
+
+        A transport that can't send doesn't call: the newest frame takes the place of the one that waits.
+
+        Args:
+            now: The engine's time [s].
+        """
+        if self.timeline is not None:
+            self.timeline.advance(now=now)
+        replies = tuple(self.outbox)
+        self.outbox.clear()
+        return replies
+
+    def next_deadline(self) -> float | None:
+        """When `advance` has something to send [s], in the engine's time; −∞ for at once."""
+        if self.outbox:
+            return float("-inf")
+        return None if self.timeline is None else self.timeline.next_deadline()
+
+    def close(self) -> None:
+        """Leave the broadcaster."""
+        if self.timeline is not None:
+            self.timeline.close()
+
+    def _carry_out(self, order: Order, now: float) -> Outcome:
+        refused = None if self._admit is None else self._admit(order)
+        if refused is not None:
+            return Outcome(order.number, now, None, refused.text, code=refused.code)
+        return self._commander.carry_out(order, now=now)
+
+
+class ServedTimeline:
+    """What one client sees of an engine's timeline: what it follows and asks, and what becomes of its orders."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        outbox: deque[Reply],
+        outcomes: OrderedDict[int, Outcome],
+        lead: float,
+        broadcasters: Sequence[Broadcaster],
+    ) -> None:
+        """Show nothing until it's asked for.
+
+        Args:
+            journal: Of the engine.
+            outbox: Takes what is to be sent.
+            outcomes: Of the client's orders, by number; those that a later command changes are sent again.
+            lead: See `Servlet`.
+            broadcasters: See there.
+        """
+        self.journal, self.outbox = journal, outbox
+        self._outcomes, self._lead, self._broadcasters = outcomes, lead, tuple(broadcasters)
         self.answers: OrderedDict[int, Frame] = OrderedDict()
         """Frames that were sent lately, by number."""
         self._forecasts = Forecasts(REMEMBERED)
@@ -91,19 +186,8 @@ class Servlet:
         self._beat: float | None = None
 
     def receive(self, message: Request, *, now: float) -> None:
-        """Take a message of the client.
-
-        Args:
-            message: What has arrived.
-            now: The engine's time [s].
-
-        Raises:
-            InvalidValueError: If it's no request.
-        """
-        self._catch_up(now)
-        if isinstance(message, Order):
-            self.orders.take(message, now)
-        elif isinstance(message, Ask):
+        """Take what the client asks or wants to follow [s]; see `Servlet`."""
+        if isinstance(message, Ask):
             self._answer(message, now)
         elif isinstance(message, Follow):
             self._begin(message, now)
@@ -111,32 +195,20 @@ class Servlet:
             self._fetch(message, now)
         else:
             raise InvalidValueError("message", message, "an Order, Ask, Follow or Want")
-        self._catch_up(now)
 
-    def advance(self, *, now: float) -> tuple[Reply, ...]:
-        """What is to be sent to the client.
-
-        A transport that can't send doesn't call: the newest frame takes the place of the one that waits.
-
-        Args:
-            now: The engine's time [s].
-        """
-        self._catch_up(now)
+    def advance(self, *, now: float) -> None:
+        """Put into the outbox what is due by now [s]."""
+        self.look(now=now)
         if self._beat is not None and now >= self._beat - DUE:
             self._beat = now + PULSE
             self.outbox.append(Pulse(self._edit, now, self.journal.past))
         message = self._slot.take() if self._slot is not None else None
         if message is not None:
             self.outbox.append(message)
-        replies = tuple(self.outbox)
-        self.outbox.clear()
-        return replies
 
     def next_deadline(self) -> float | None:
-        """When `advance` has something to send [s], in the engine's time; −∞ for at once."""
-        if self.outbox or self._slot:
-            return float("-inf")
-        return self._beat
+        """When `advance` has something for the outbox [s]; −∞ for at once."""
+        return float("-inf") if self._slot else self._beat
 
     def close(self) -> None:
         """Leave the broadcaster."""
@@ -144,31 +216,11 @@ class Servlet:
             self._source.leave(self._slot)
         self._slot = self._source = self._beat = self._follow = None
 
-    def _carry_out(self, order: Order, now: float) -> Outcome:
-        refused = None if self._admit is None else self._admit(order)
-        if refused is not None:
-            return Outcome(order.number, now, None, refused.text, code=refused.code)
-        engine = self.journal.engine
-        try:
-            why = engine.undo_refusal() if order.command is None else ""
-            receipt = self.journal.execute(order.command)
-        except VrsError as error:
-            return Outcome(order.number, now, None, str(error))
-        if receipt is None:
-            return Outcome(order.number, now, None, why)
-        known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
-        code = known if isinstance(known, RefusalCode) else RefusalCode.OTHER
-        try:
-            receipt = portable(receipt, MOST_NAMES)
-        except Exception:  # noqa: BLE001 - the command is carried out, whatever keeps the others from being named
-            receipt = msgspec.structs.replace(receipt, shifted_names=(), superseded_names=())
-        return Outcome(order.number, now, receipt, code=code)
-
     def _answer(self, ask: Ask, now: float) -> None:
         frame = self.answers.get(ask.number)
         if frame is None:
             engine = self.journal.engine
-            t = engine.now() + self.lead if ask.t is None else ask.t
+            t = engine.now() + self._lead if ask.t is None else ask.t
             q = frozen_array(engine.timeline.sample(t))
             status = self._forecasts.add(ask.number, t, q, now=self.journal.past)
             frame = Frame(ask.number, t, now, q, status)
@@ -224,7 +276,7 @@ class Servlet:
         self.outbox.extend(known)
         return True
 
-    def _catch_up(self, now: float) -> None:
+    def look(self, *, now: float) -> None:
         """Look what has been done to the timeline, and tell the client."""
         newest = self.journal.look()
         if newest != self._edit:
@@ -252,13 +304,13 @@ class Servlet:
 
     def _revise(self, now: float) -> None:
         """Send the receipts again that a later command changed."""
-        for number in list(self.orders.outcomes)[-WATCHED:]:
-            outcome = self.orders.outcomes[number]
+        for number in list(self._outcomes)[-WATCHED:]:
+            outcome = self._outcomes[number]
             old = outcome.receipt
             if old is None or not old.stands:
                 continue
             new = self.journal.engine.receipt(old.command_id)
             if new.version != old.version:
                 revised = Outcome(number, now, portable(new, MOST_NAMES), "", outcome.revision + 1)
-                self.orders.outcomes[number] = revised
+                self._outcomes[number] = revised
                 self.outbox.append(revised)

@@ -1,4 +1,4 @@
-"""What runs near an engine, under a clock that is shifted by D."""
+"""What runs near an engine, under a clock that is shifted by D; and what a hub serves of a robot, of any."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 
 from interfaces.engine_server.broadcast import Broadcaster
 from interfaces.engine_server.journal import Journal
-from interfaces.engine_server.servlet import Servlet
+from interfaces.engine_server.servlet import Commander, Servlet
 from interfaces.messages import Order, Refusal, control
 from vrs.checks import finite
 from vrs.clock import ManualClock
-from vrs.engine import Engine
+from vrs.engine import Engine, MobileEngine
+from vrs.errors import InvalidValueError
 
 
 def earliest(*times: float | None) -> float | None:
@@ -29,21 +30,29 @@ def engine_time(t_user: float, D: float) -> float:
 
 
 class Site:
-    """An engine with its journal, broadcasters and servlets, all under one clock."""
+    """An engine with its journal, broadcasters and servlets under one clock; or a robot that is driven live."""
 
-    def __init__(self, engine: Engine, *, D: float = 0.0) -> None:
-        """Gather round an engine.
+    def __init__(self, robot: Engine | Commander, *, D: float = 0.0, room: str = "") -> None:
+        """Gather round a robot.
 
         Args:
-            engine: Under a `ManualClock`, which this site then moves; under another clock, or none, D is that
-                clock's affair.
+            robot: An engine under a `ManualClock`, which this site then moves; under another clock, or none, D is
+                that clock's affair. Or who carries out orders and has no timeline to be followed.
             D: How far the engine's clock is ahead of the users' [s]; −D_f and +D_b are the paper's choices. It may
                 be changed, but the engine's clock never runs back: it stands until time has caught up.
+            room: Where a mobile robot drives, for people.
         """
-        self.engine = engine
+        self._commander = Journal(robot) if isinstance(robot, Engine) else robot
+        self.journal = self._commander if isinstance(self._commander, Journal) else None
+        """Of the engine's timeline; None where none is to be followed."""
         self.D = finite("D", D, "finite seconds")
-        self.journal = Journal(engine)
+        self._room = room
         self._broadcasters: list[Broadcaster] = []
+
+    @property
+    def engine(self) -> Engine:
+        """What carries out commands."""
+        return self._commander.engine
 
     @property
     def broadcasters(self) -> tuple[Broadcaster, ...]:
@@ -56,21 +65,38 @@ class Site:
         return self.engine.model.name
 
     def broadcast(self, rate: float, *, lead: float = 0.0) -> Broadcaster:
-        """Add a broadcaster; see there."""
+        """Add a broadcaster; see there.
+
+        Raises:
+            InvalidValueError: If the rate isn't allowed, or there's no timeline.
+        """
+        if self.journal is None:
+            raise InvalidValueError("rate", rate, "none: a mobile robot has no frames")
         self._broadcasters.append(Broadcaster(self.journal, rate=rate, lead=lead))
         return self._broadcasters[-1]
 
     def servlet(self, *, lead: float = 0.0, admit: Callable[[Order], Refusal | None] | None = None) -> Servlet:
         """Make the server submodule of one more client, which finds the broadcasters that are there now."""
-        return Servlet(self.journal, lead=lead, broadcasters=self._broadcasters, admit=admit)
+        return Servlet(self._commander, lead=lead, broadcasters=self._broadcasters, admit=admit)
 
     def look(self) -> int:
-        """Number of the newest edit."""
-        return self.journal.look()
+        """Number of the newest edit; 0 where no timeline is to be followed."""
+        return 0 if self.journal is None else self.journal.look()
 
-    def welcome(self, **facts: Any) -> control.Welcome:
+    def welcome(self, **facts: Any) -> control.Welcome | control.MobileWelcome:
         """What a client of a server is told that is let in: the facts that every client is told, and these."""
-        model = self.engine.model
+        engine = self.engine
+        if isinstance(engine, MobileEngine):
+            return control.MobileWelcome(
+                protocol=control.PROTOCOL,
+                robot=engine.model.name,
+                limits=engine.model.limits,
+                period=engine.model.period,
+                holds=control.HOLDS,
+                room=self._room,
+                **facts,
+            )
+        model = engine.model
         return control.Welcome(
             protocol=control.PROTOCOL,
             robot=model.name,
@@ -84,9 +110,9 @@ class Site:
     def time(self, now: float) -> float:
         """The engine's time [s] when the users' clock shows now [s]; moves a manual clock on to it.
 
-        An offline engine has no time of its own: its plan is looked at by the users'.
+        An offline engine has no time of its own: its plan is looked at by the users'; so is what is driven live.
         """
-        clock = self.engine.clock
+        clock = None if self.journal is None else self.engine.clock
         if clock is None:
             return now
         if isinstance(clock, ManualClock):

@@ -6,7 +6,7 @@ Frozen values, like those of `interfaces.messages`. Times are session times: the
 from __future__ import annotations
 
 import enum
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -317,6 +317,10 @@ class Welcome(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag=
 Positive = Annotated[float, Meta(gt=0, le=1e9)]
 
 
+HOLDS: Final = 0.3
+"""A drive order counts for so long after it was issued [s]: who says nothing more stops."""
+
+
 class MobileWelcome(Message, frozen=True, omit_defaults=True, gc=False, tag="mobile-welcome"):
     """The client may go on; what there is."""
 
@@ -380,6 +384,8 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
     """Of a mobile robot: what it does with the operator's path, by name."""
     room: Word = ""
     """Of a mobile robot: name of the room that it drives in."""
+    estimates: bool = False
+    """Of a mobile robot: whether its virtual one is drawn where the posture estimator has it."""
 
 
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):

@@ -11,7 +11,7 @@ import math
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import msgspec
 
@@ -39,9 +39,6 @@ from interfaces.stream.limits import Allowance, Allowances, Bucket, ClientLimits
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
 
-if TYPE_CHECKING:
-    from interfaces.stream.driving import DriveSite
-
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
 
@@ -64,6 +61,8 @@ _MUTE = 1.0
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
 _SENT = sent_by(Role.ADMIN)
 """What some client may send."""
+
+_NO_TIMELINE = "a mobile robot's postures are told to every client: there's nothing to follow, ask or want"
 
 _LOG = logging.getLogger(__name__)
 
@@ -261,6 +260,9 @@ class HubSession:
 
     def _serve(self, seat: SessionState, message: Order | Ask | Follow | Want, now: float) -> None:
         if not isinstance(message, Order):
+            if seat.servlet.timeline is None:
+                self.outbox.put(Problem(ProblemCode.NOT_ALLOWED, _NO_TIMELINE, getattr(message, "number", None)))
+                return
             if self.outbox.is_full:
                 return
             if isinstance(message, Want):
@@ -377,7 +379,7 @@ class Hub:
 
     def __init__(
         self,
-        site: Site | DriveSite,
+        site: Site,
         lease: Lease,
         access: Access,
         robot: LeasedRobot,

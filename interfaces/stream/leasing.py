@@ -12,7 +12,6 @@ from robots.onboard.lease import Ended, Grant, Lease, LeaseEnd, LeaseRefusal
 
 if TYPE_CHECKING:
     from interfaces.engine_server.servlet import Servlet
-    from interfaces.stream.driving import DriveServlet
 
 
 Wish: TypeAlias = control.LeaseWish | control.Beat
@@ -26,7 +25,7 @@ class SessionState:
 
     def __init__(self, key: str, name: str, role: Role, *, local: bool = False) -> None:
         self.key, self.name, self.role, self.local = key, name, role, local
-        self.servlet: Servlet | DriveServlet
+        self.servlet: Servlet
         self.left = 0.0
         """When its connection was lost [s]."""
 

@@ -11,7 +11,8 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
-from interfaces.messages.control import SensedPoints
+from interfaces.messages import Order, Outcome, RefusalCode
+from interfaces.messages.control import HOLDS, SensedPoints
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import HALT, Doing, Errand, RobotTask, TaskReport
 from interfaces.messages.recording import CommandRecord
@@ -23,16 +24,18 @@ from interfaces.teleop.halt import Halt, HaltCause, not_following
 from interfaces.teleop.operator import Correction, OperatorSite, VirtualRobot
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from vrs.checks import finite, normal
+from vrs.commands import DriveCommand, Stop
 from vrs.engine import MobileEngine
 from vrs.mobile import MobileModel
 from vrs.mobile.model import braking
 from vrs.model import Array, frozen_array
 from vrs.segment import ArcSegment
 
+COMMANDS: Final = "a mobile robot is driven and stopped: drive and stop are what can be ordered"
+AT_ONCE: Final = "a live drive begins as it comes: leave out execute_at"
+"""Why a client's order isn't carried out."""
 MOVING: Final = "the robot isn't at rest yet"
 """Why it can't go on."""
-HOLDS: Final = 0.3
-"""A wish counts for so long [s]: who says nothing more stops."""
 ERRANDS: Final = 4
 """So many that the robot isn't known to have are sent at once."""
 WAITS: Final = 5.0
@@ -75,7 +78,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         self.sight: SensedPoints | None = None
         """What it saw last."""
         self.estimating = False
-        """Whether the real robot's architecture has a posture estimator, see `ESTIMATING`."""
+        """Whether the real robot's architecture has a posture estimator, see `Architecture.estimates`."""
         self._errands: Outgoing[Errand] = Outgoing()
         self._later: tuple[tuple[float, tuple[RobotTask, ...]], ...] = ()
         """What it's to be told when the next drive has begun, and when that was given [s]."""
@@ -116,6 +119,21 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     def period(self) -> float:
         """T, between two commands [s]."""
         return self._model.period
+
+    def carry_out(self, order: Order, *, now: float) -> Outcome:
+        """Drive or stop as a client orders, see `interfaces.engine_server.servlet.Commander`."""
+        command, refusal, code = order.command, "", RefusalCode.OTHER
+        if isinstance(command, Stop):
+            self.stop(now=now)
+        elif not isinstance(command, DriveCommand):
+            refusal = COMMANDS
+        elif command.execute_at is not None:
+            refusal = AT_ONCE
+        else:
+            issued = now if command.issued_at is None else command.issued_at
+            refusal = self.wish(command.v, command.w, issued_at=issued, now=now, lasts=command.duration)
+            code = RefusalCode.NOT_FOLLOWING if refusal else code
+        return Outcome(order.number, now, None, refusal, code=code)
 
     def wish(self, v: float, w: float, *, issued_at: float, now: float, lasts: float = HOLDS) -> str:
         """Drive so from the next command on, as far as the limits allow, for a while.

@@ -38,6 +38,7 @@ from interfaces.stream.connection import Connection
 from interfaces.stream.server import application
 from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.following_base import DrivenConfig
+from interfaces.teleop.virtual_base import VirtualBase
 from robots import load
 from robots.bullet.rooms import EMPTY
 from robots.mobile.robot import place
@@ -98,6 +99,39 @@ def controlled(robot: Connection) -> None:
         assert time.monotonic() < end
         time.sleep(0.05)
     assert robot.wait(lambda it: it.postures is not None and not it.postures.halted, 20.0)
+
+
+OWN = """
+from interfaces.teleop.architectures import Immediate
+
+class Drawn(Immediate):
+    def __init__(self, constants, posture):
+        super().__init__()
+
+class Reckoned(Drawn):
+    estimates = False
+"""
+
+
+@pytest.mark.parametrize("name", ["Drawn", "Reckoned"])
+def test_an_architecture_of_ones_own_says_how_the_virtual_robot_is_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "own_estimating.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    async def estimating() -> bool:
+        body = PacedBody(PacedConfig(ROBOT, ROOM, architecture=f"own_estimating:{name}"))
+        async with listening(LiveRobot(body, Access(free={Role.SITE}))) as url:
+            operator = LiveOperator(LiveOperatorConfig(ROBOT, url, LinkConditions(), room=ROOM), Access(free=OPEN))
+            async with operator.running(), asyncio.timeout(20.0):
+                while operator.robot.attached is None:
+                    await asyncio.sleep(0.02)
+                operator.twins.draw(operator.robot.attached, now=operator.clock.now())
+                drawn: VirtualBase = operator.twins.operator.robot
+                return drawn.estimating
+
+    assert asyncio.run(estimating()) is (name == "Drawn")
 
 
 @pytest.mark.parametrize("loss", OperatorLoss)

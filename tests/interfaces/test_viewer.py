@@ -399,7 +399,7 @@ def test_memory_of_clients_is_bounded():
         joined.run(0.1)
     assert viewer.number > 4500
     assert len(viewer.history) == 4096
-    assert len(port.servlet.answers) <= 1024
+    assert len(port.servlet.timeline.answers) <= 1024
     assert len(port.servlet.outbox) <= 1024
     assert len(supervisor.observer.answers) <= 4096
 

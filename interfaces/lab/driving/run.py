@@ -23,12 +23,12 @@ from interfaces.teleop.architectures import (
     ArchitectureRobotSite,
     TimelineController,
     Transport,
+    architecture,
     controller,
 )
 from interfaces.teleop.architectures.compositions import (
     CONTROL,
     POSITIONS,
-    SENSING,
     operator_surroundings,
     robot_surroundings,
 )
@@ -50,7 +50,7 @@ LONGEST_WAIT = 600.0
 
 def make_robot(case: DriveCase, start: Posture, room: str | Room) -> MobileRobot:
     """The real robot of a case."""
-    senses = Senses() if case.architecture in SENSING else Senses(sonar=None)
+    senses = Senses() if architecture(case.architecture).senses else Senses(sonar=None)
     if case.position == "laser":
         senses = replace(senses, laser=case.real[0].device(LaserModel) or LaserModel())
     # The seed's own streams: of the robot, of the network, of the operator.
@@ -92,7 +92,7 @@ def _driven(
     """Drive from the start until the real robot could have done all."""
     model = replace(case.real[0].base, period=case.constants.period)
     made = controller(case.architecture, driver.start, case.constants)
-    senses = case.architecture in SENSING
+    senses = architecture(case.architecture).senses
     there = operator_surroundings(body.room, driver.start, model) if senses else None
     here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
     site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)

@@ -15,8 +15,7 @@ from interfaces.lab.runner import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.runs.drive_run import DriveCase, Row, row_of
 from interfaces.runs.summary import Attribution
-from interfaces.teleop.architectures import Transport
-from interfaces.teleop.architectures.compositions import SENSING
+from interfaces.teleop.architectures import Transport, architecture
 from robots.mobile.chassis import MobileReality
 from robots.mobile.robot import place
 from vrs.comparison import PathComparison
@@ -175,7 +174,7 @@ def _variants(case: DriveCase) -> list[DriveCase]:
     step = 1 / 60 if case.robot == "bare" else 1 / 240
     alike = replace(prompt, reality=MobileReality.ideal(dt=step))
     placed = replace(alike, position="truth")
-    if case.architecture not in SENSING:
+    if not architecture(case.architecture).senses:
         # It neither senses what's unknown nor avoids it.
         return [case, prompt, alike, placed, placed]
     room = case.room or operator(case.operator, case.seed, case.constants.period).room

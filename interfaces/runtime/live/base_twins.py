@@ -10,16 +10,16 @@ from typing import Any, Final
 import numpy as np
 from typing_extensions import override
 
+from interfaces.engine_server.site import Site
 from interfaces.link import LinkConditions
 from interfaces.messages.control import MOST_MESSAGES, Attached, Postures
 from interfaces.messages.jobs import Doing
 from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.twins import LiveTwins
-from interfaces.stream.driving import DriveSite
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.architectures import OperatorSurroundings
-from interfaces.teleop.architectures.compositions import ESTIMATING, grid_of, operator_surroundings
+from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.halt import Halt, HaltCause
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
@@ -95,7 +95,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
         virtual = VirtualBase(self._model, start, now=0.0, around=self._around)
         self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
         self.line: DriveLine = DriveLine(self.operator, conditions, np.random.default_rng(seed))
-        self.site = DriveSite(self.operator, self._model, room=room.name)
+        self.site = Site(virtual, room=room.name)
         grid = grid_of(room, start)
         self.scene = TwinScene(robot, start, room=None if room is EMPTY else room, grid=grid)
         self._ways: dict[str, _DrivenTrace] = {}
@@ -172,7 +172,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
 
     @override
     def draw(self, attached: Attached | None, *, now: float) -> None:
-        self.operator.robot.estimating = attached is not None and attached.architecture in ESTIMATING
+        self.operator.robot.estimating = attached is not None and attached.estimates
         self._follow()
         if not self.scene.readers:
             return

@@ -20,7 +20,7 @@ from interfaces.jobs import RunnerConfig
 from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.runtime.live.robot import LiveBody
 from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, architecture, controller
-from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, SENSING, robot_surroundings
+from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, robot_surroundings
 from interfaces.teleop.autonomy import Autonomy, Hands, LaserSight, NavigatorPilot
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
@@ -87,6 +87,8 @@ class PacedBody(LiveBody):
             config: The robot.
         """
         self.config, self.name, self.watchdog = config, config.robot.name, config.driven.watchdog
+        self._composed = architecture(config.architecture)
+        self.estimates = self._composed.estimates
         self.about = {"architecture": config.architecture, "room": config.room.name}
         senses = Senses(laser=config.robot.device(LaserModel) or LaserModel())
         rng = np.random.default_rng(config.seed)
@@ -187,7 +189,7 @@ class PacedBody(LiveBody):
         config, body = self.config, self.body
         made = controller(config.architecture, start, config.constants)
         around = None
-        if config.architecture in SENSING:
+        if self._composed.senses:
             around = robot_surroundings(body, start, made, CONTROL, since=body.time - since)
         return ArchitectureRobotSite(made, self._position, body.limits, period=CONTROL, surroundings=around)
 

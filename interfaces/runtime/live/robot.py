@@ -41,6 +41,8 @@ class LiveBody(ABC):
     """Name of the robot's model."""
     about: Mapping[str, str] = {}
     """What else an operator's site is told when it's met, and `/health` says."""
+    estimates = False
+    """Of a mobile robot, see `Attached.estimates`."""
     offset: float | None = None
     """The robot's timeline less session time [s]; None: it adapts."""
     watchdog: WatchdogConfig | None
@@ -156,7 +158,7 @@ class LiveRobot:
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         return Attached(
             PROTOCOL, body.name, body.q, loss, timeout, body.offset, self.instance, self._program, max_age=age,
-            **body.about,
+            estimates=body.estimates, **body.about,
         )  # fmt: skip
 
     def health(self) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from interfaces.messages.control import MOST_MESSAGES, Attached, Postures, State
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import Report
 from interfaces.runtime.live.process import warm
-from interfaces.stream.driving import DriveSite
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine, VirtualArm
 from interfaces.teleop.connection import SiteLine
@@ -44,7 +43,7 @@ class LiveTwins(Protocol[V]):
     """The operator's site."""
     line: SiteLine[V, Any, Any]
     """To the real one."""
-    site: Site | DriveSite
+    site: Site
     """What a hub serves."""
     scene: TwinScene
     """What all viewers see, once it's dressed."""

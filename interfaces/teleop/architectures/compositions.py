@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, Final
 
 import numpy as np
 
@@ -50,30 +50,38 @@ class Constants:
         number_in("processing", self.processing, 1e-4, self.period, unit=" s")
 
 
-Architecture: TypeAlias = Callable[[Constants, Posture], DriveController]
-"""Makes a controller for a robot that begins at a posture at time 0."""
+@dataclass(frozen=True, slots=True)
+class Architecture:
+    """What the real robot does with the operator's commands, and what both sites have for it."""
+
+    make: Callable[[Constants, Posture], DriveController]
+    """Makes a controller for a robot that begins at a posture at time 0."""
+    estimates: bool = True
+    """Whether the virtual robot is drawn where the posture estimator has it, as the paper's are."""
+    senses: bool = False
+    """Whether the robot has sonars and avoids what they see, and the operator's site has the map of the room."""
 
 
-def _following(law: FieldLaw) -> Architecture:
-    return lambda c, posture: FollowingController(posture, law, c.following, processing=c.processing)
+def _following(law: FieldLaw, *, senses: bool = False) -> Architecture:
+    return Architecture(
+        lambda c, posture: FollowingController(posture, law, c.following, processing=c.processing), senses=senses
+    )
 
 
 ARCHITECTURES: Final[dict[str, Architecture]] = {
-    "I": lambda _, __: Immediate(),
-    "II": lambda c, _: Filtered(c.period),
+    "I": Architecture(lambda _, __: Immediate()),
+    "II": Architecture(lambda c, _: Filtered(c.period)),
     "III": _following(FieldLaw.LITERAL),
     "III-capped": _following(FieldLaw.CAPPED),
-    "extended": _following(FieldLaw.CAPPED),
-    "timeline": lambda _, posture: TimelineController(posture, now=0.0),
+    "extended": _following(FieldLaw.CAPPED, senses=True),
+    # The real robot plays the operator's path: where his commands lead is where it comes to.
+    "timeline": Architecture(lambda _, posture: TimelineController(posture, now=0.0), estimates=False),
 }
-"""What makes each architecture's controller."""
-ESTIMATING: Final = ("I", "II", "III", "III-capped", "extended")
-"""Architectures whose virtual robot is drawn where the posture estimator has it, as the paper's are. Of
-`timeline` the real robot plays the operator's path: where his commands lead is where it comes to."""
+"""The architectures by name."""
 
 
 def architecture(name: str) -> Architecture:
-    """What makes the controllers of an architecture.
+    """Find an architecture; what makes the controllers of one's own may say `estimates` and `senses` of it.
 
     Args:
         name: One of `ARCHITECTURES`, or `module:name` of one's own.
@@ -83,7 +91,8 @@ def architecture(name: str) -> Architecture:
         FormatError: If the module can't be imported.
     """
     if is_own(name):
-        return own("architecture", name, ("constants", "posture"))
+        made = own("architecture", name, ("constants", "posture"))
+        return Architecture(made, bool(getattr(made, "estimates", True)), bool(getattr(made, "senses", False)))
     return ARCHITECTURES[one_of("architecture", name, ARCHITECTURES, "or MODULE:NAME of your own")]
 
 
@@ -99,7 +108,7 @@ def controller(name: str, posture: Posture, constants: Constants) -> DriveContro
         InvalidValueError: If there's none of that name, or it makes something else.
         FormatError: If the module can't be imported.
     """
-    made = architecture(name)(constants, posture)
+    made = architecture(name).make(constants, posture)
     checked("architecture", name, made, ("receive", "control", "executed"))
     return made
 
@@ -110,8 +119,6 @@ CELLS: Final = (125, 61)
 """Cells of the virtual environment along x and y where there's no room; Han, Kim, Kim, Kim, 2001, section 3.2."""
 CELL: Final = 0.1
 """Side of a cell [m], an assumption: a room of 12.5 m × 6.1 m, and a robot of about five cells across."""
-SENSING = ("extended",)
-"""Architectures whose robot has sonars, and whose operator has the map of the room."""
 POSITIONS: Final[dict[str, Callable[[MobileRobot], PositionSource]]] = {
     "fused": FusedPosition,
     "laser": LaserPosition,

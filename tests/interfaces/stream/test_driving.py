@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 
+from interfaces.engine_server.servlet import Servlet
+from interfaces.engine_server.site import Site
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
 from interfaces.messages.control import MobileWelcome, Postures, Problem, Seen, Welcome
 from interfaces.messages.jobs import RobotTask, Tasks
 from interfaces.stream import Encoding
 from interfaces.stream.access import OPEN, Access
 from interfaces.stream.client import ClientCore, Phase
-from interfaces.stream.driving import DriveServlet, DriveSite
 from interfaces.stream.hub import Hub, HubConfig, HubSession
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.journey import Goal
@@ -41,7 +42,7 @@ def met() -> Rig:
     return rig
 
 
-def ordered(servlet: DriveServlet, number: int, command: Any, now: float) -> Outcome:
+def ordered(servlet: Servlet, number: int, command: Any, now: float) -> Outcome:
     servlet.receive(Order(number, command, 1), now=now)
     (outcome,) = servlet.advance(now=now)
     assert isinstance(outcome, Outcome)
@@ -50,7 +51,7 @@ def ordered(servlet: DriveServlet, number: int, command: Any, now: float) -> Out
 
 def test_what_is_ordered_is_driven_and_nothing_else() -> None:
     rig = met()
-    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: None)
+    servlet = Site(rig.operator.robot).servlet(admit=lambda _: None)
     now = rig.now
     assert ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), now).refusal == ""
     rig.run(0.2)
@@ -69,7 +70,7 @@ def test_what_is_ordered_is_driven_and_nothing_else() -> None:
 
 def test_who_isnt_admitted_drives_nothing() -> None:
     rig = met()
-    servlet = DriveSite(rig.operator, MODEL).servlet(admit=lambda _: Refusal("no lease: acquire it first"))
+    servlet = Site(rig.operator.robot).servlet(admit=lambda _: Refusal("no lease: acquire it first"))
     assert "no lease" in ordered(servlet, 1, DriveCommand(0.3, 0.0, 0.3), rig.now).refusal
     rig.run(0.5)
     assert rig.operator.robot.stands
@@ -77,7 +78,7 @@ def test_who_isnt_admitted_drives_nothing() -> None:
 
 @pytest.fixture
 def hub() -> Hub:
-    site = DriveSite(met().operator, MODEL, room="Empty room")
+    site = Site(met().operator.robot, room="Empty room")
     return Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()))
 
 
@@ -163,7 +164,7 @@ class Workers:
 
 
 def test_only_who_has_control_lets_the_robot_do_something_and_all_are_told() -> None:
-    site, workers = DriveSite(met().operator, MODEL), Workers()
+    site, workers = Site(met().operator.robot), Workers()
     hub = Hub(site, Lease(), Access(free=OPEN), Robot(), config=HubConfig(rates=()), workers=workers)
     ada, bob = hub.open(Encoding.JSON, now=5.0), hub.open(Encoding.JSON, now=5.0)
     said(ada, HELLO)

@@ -9,12 +9,13 @@ import pytest
 from msgspec.structs import replace
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
+from interfaces.messages.control import HOLDS
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import DriveOrders
 from interfaces.teleop.architectures import ARCHITECTURES
 from interfaces.teleop.following_base import TOO_FAR
 from interfaces.teleop.halt import Halt, HaltCause
-from interfaces.teleop.virtual_base import HOLDS, MOVING
+from interfaces.teleop.virtual_base import MOVING
 from robots.onboard.driving import IPR_LIMITS, Posture
 from tests.interfaces.teleop.rig import CONTROL, MODEL, TURN, Rig
 
