@@ -49,6 +49,14 @@ for (const { duration, sourceURL, invoker } of entry.scripts) held.push([duratio
 }).observe({ type: 'long-animation-frame', buffered: true }); }"""
 
 
+def holds(page: Any, expression: str) -> None:
+    """Wait until something is so in a page, whose policy doesn't allow Playwright's own waiting."""
+    end = time.monotonic() + 60.0
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, expression
+        time.sleep(0.02)
+
+
 @contextlib.contextmanager
 def browser_page(url: str) -> Iterator[Any]:
     """A page in Chromium that's live."""
@@ -58,8 +66,8 @@ def browser_page(url: str) -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(url)
-        page.wait_for_function(READY, timeout=60_000)
-        page.wait_for_function("station.session.state !== null", timeout=60_000)
+        holds(page, READY)
+        holds(page, "station.session.state !== null")
         yield page
         browser.close()
 
@@ -222,7 +230,7 @@ def use(page: Any, seconds: float) -> None:
     """Do something with a page every second."""
     if not page.evaluate("station.session.holds"):
         page.click("#take")
-        page.wait_for_function("station.session.holds")
+        holds(page, "station.session.holds")
         page.select_option("#when", "append")
     end, turn = time.monotonic() + seconds, 0
     while time.monotonic() < end:

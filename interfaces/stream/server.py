@@ -29,12 +29,12 @@ from interfaces.timer import Turning
 from vrs.clock import Clock
 
 POLICY: Final = (
-    "default-src 'none'; script-src 'self'{scripts}; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Nothing from elsewhere, and no script in the page but those that the server put there."""
+"""Nothing from elsewhere, and no script but the files that the server has."""
 HEADERS: Final = {
-    "Content-Security-Policy": POLICY.format(scripts=""),
+    "Content-Security-Policy": POLICY,
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
