@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cache
 from importlib import resources
 from typing import Any, Final
 
@@ -20,7 +21,7 @@ _READER: Final = frozenset({"vrs.js", "protocol.js"})
 """What the protocol has for pages: its reader, and what checks its messages."""
 
 
-@lru_cache(maxsize=1)
+@cache
 def names() -> frozenset[str]:
     """What is served below `/station/`."""
     own = resources.files("interfaces.station").joinpath("static").iterdir()
@@ -31,10 +32,11 @@ async def _answer(request: Request) -> Response:
     name = request.path_params["name"]
     if name not in names():
         return Response("not here", 404, HEADERS, "text/plain")
-    return _file(name).answer(request, _TYPES[name.rpartition(".")[2]], HEADERS)
+    file = await asyncio.to_thread(_file, name)
+    return file.answer(request, _TYPES[name.rpartition(".")[2]], HEADERS)
 
 
-@lru_cache(maxsize=64)
+@cache
 def _file(name: str) -> KeptFile:
     package = "interfaces.stream" if name in _READER else "interfaces.station"
     return KeptFile.of(resources.files(package).joinpath(f"static/{name}").read_bytes())
