@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vrs.clock import Clock, ManualClock, OffsetClock, SlewedClock, WallClock
 from vrs.commands import (
+    Alter,
     Cancel,
     DriveCommand,
     Frame,
@@ -31,6 +32,7 @@ from vrs.segment import ArcSegment, PolynomialSegment, Segment
 from vrs.timeline import Timeline
 
 __all__ = [
+    "Alter",
     "ArcSegment",
     "Cancel",
     "Clock",

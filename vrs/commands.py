@@ -356,7 +356,37 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
         _check_stamps(self)
 
 
-PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume
+class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="alter"):
+    """Add an offset to the path of the tool that's planned; given again and again, it's followed.
+
+    It's reached 56 ms after it was issued. Where no other one comes, it goes back to nothing.
+    """
+
+    offset: Twist
+    """Translation [m], then rotation vector [rad], (6,): all of it, not what's added to the one before."""
+    frame: Frame = Frame.BASE
+    """Axes of the offset; those of the tool are those of `tool`, as it's planned to be turned."""
+    tool: Pose | None = None
+    """What is offset: a frame in the last link's, (4, 4), by rows; None: that link."""
+    stays: bool = False
+    """Whether it stays where the plan is over by then."""
+    issued_at: Time | None = None
+    """Issue time t_iss [s], from which its delay counts; one older than 0.2 s moves nothing."""
+    execute_at: Time | None = None
+    """When the path begins to change [s]; None: as soon as possible."""
+
+    def __post_init__(self) -> None:
+        offset = sized_array("offset", self.offset, (6,), "a translation [m] and a rotation vector [rad], (6,)")
+        if np.sqrt(offset[3:] @ offset[3:]) > np.pi:
+            raise InvalidValueError("offset", self.offset, "a rotation vector no longer than π")
+        set_field(self, "offset", offset)
+        if self.tool is not None:
+            set_field(self, "tool", _transform("tool", self.tool))
+        set_field(self, "frame", word("frame", self.frame, Frame))
+        _check_stamps(self)
+
+
+PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume | Alter
 """Edits of what is scheduled."""
 
 

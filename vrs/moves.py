@@ -17,6 +17,7 @@ import numpy as np
 
 from vrs import planning
 from vrs.commands import (
+    Alter,
     DriveCommand,
     InsertVia,
     JointTarget,
@@ -40,6 +41,9 @@ from vrs.planning.rounding import braking, continuous, starting
 from vrs.segment import State
 from vrs.timeline import Timeline
 
+_SPATIAL = 6
+"""Joints of an arm whose tool can be offset in every direction."""
+
 Checked: TypeAlias = MotionCommand | SteerCommand | PlanEdit | PositionQuery | ParameterChange
 """A command that an engine for an arm takes."""
 
@@ -60,6 +64,8 @@ def check(command: object, model: RobotModel) -> Checked:
         target = command.target
         if isinstance(target, JointTarget) and target.q.shape != (n,):
             raise InvalidValueError("target q", target.q, f"of shape ({n},) for {model.name}")
+    if isinstance(command, Alter) and n != _SPATIAL:
+        raise InvalidValueError("command", command, f"for an arm of {_SPATIAL} joints: {model.name} has {n}")
     if isinstance(command, SteerCommand) and command.rates is not None and command.rates.shape != (n,):
         raise InvalidValueError("rates", command.rates, f"of shape ({n},) for {model.name}")
     return command

@@ -42,6 +42,8 @@ class NoteCode(Enum):
     NO_SMOOTH_STOP_BEFORE_LINE = "braked with parabolas, as no jerk-limited stop keeps the limits"
     TURNS_ON_THE_SPOT = "joints {} turn on the spot first: the line leaves a singular pose"
 
+    OFFSET_LATE = "the limits don't let the offset be reached in time"
+
     PASSES_VIA = "passes the via within {:.3g} m"
     STOPS_AT_VIA = "stops at the via: no overlap keeps the limits"
     NOTHING_TO_ROUND = "no move ends where this one begins: nothing to round"

@@ -10,7 +10,7 @@ Source: Doulgeri, Zikos, Delopoulos, section II-B.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import Enum
@@ -20,11 +20,14 @@ from operator import add
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
+from typing_extensions import override
 
 from vrs.anchoring import Anchored, anchored
 from vrs.commands import (
+    Alter,
     Cancel,
     DriveCommand,
+    Frame,
     Insertion,
     InsertVia,
     JointTarget,
@@ -58,6 +61,7 @@ from vrs.insertion import (
     piece,
     removed,
     room,
+    shifted,
     span,
     stay,
 )
@@ -65,8 +69,8 @@ from vrs.ledger import ARRIVED, MOST_KNOWN, Change, Ledger, LedgerEntry, Names, 
 from vrs.model import Array, Limits, RobotModel, frozen_array
 from vrs.moves import Passer, join, move
 from vrs.notes import Note, NoteCode, Notes, is_rough, text_of
-from vrs.pacing import as_plan, composed, halting, paced, remainder, straight_until
-from vrs.planning import Plan, rounding, steering
+from vrs.pacing import as_plan, composed, halting, paced, remainder, segment_at, straight_until
+from vrs.planning import Plan, altering, rounding, steering
 from vrs.planning.certificate import violation
 from vrs.planning.jerk_limited import is_prompt_stop, stop, straight_stop
 from vrs.planning.plan import end_position, end_state
@@ -288,6 +292,26 @@ class Paused(NamedTuple):
     """When the stop began [s]."""
 
 
+class Alteration(NamedTuple):
+    """An offset that's added to what is planned."""
+
+    command_id: int
+    version: int
+    """Of the timeline that has the offset in it: any edit that doesn't renew it ends it."""
+    start: float
+    """When the first one began [s]."""
+    planned: Timeline
+    """Without the offset from the newest one on; what came before is as it was."""
+    rejoins: float
+    """From here on the timeline is as it's planned [s]."""
+    course: altering.Course
+    given: Sequence[altering.Given]
+    """The newest offsets."""
+    frame: Frame
+    tool: Array | None
+    stays: bool
+
+
 class Scheduler(BaseScheduler[Timeline]):
     """What an engine has planned: a timeline, the limits in force, and a ledger of receipts."""
 
@@ -301,6 +325,8 @@ class Scheduler(BaseScheduler[Timeline]):
         self.session: tuple[int, int, float] | None = None
         """Steering inputs in a row: their command, the version of the timeline that the newest made, when the first
         began [s]."""
+        self.alteration: Alteration | None = None
+        """The newest; it's in force while the timeline is of its version."""
 
     def move(self, command: MotionCommand, now: float | None) -> Receipt:
         """Carry out a motion command.
@@ -309,6 +335,9 @@ class Scheduler(BaseScheduler[Timeline]):
             command: Checked by the analyser.
             now: Present time [s]; None offline.
         """
+        return self._under_offset(partial(self._move, command, now), now)
+
+    def _move(self, command: MotionCommand, now: float | None) -> Receipt:
         issued = command.issued_at if command.issued_at is not None else now
         asked, end = command.execute_at, self.timeline.end
         try:
@@ -457,6 +486,127 @@ class Scheduler(BaseScheduler[Timeline]):
         receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
         return self.accept(LedgerEntry(receipt, notes=notes), edit, t)
 
+    def alter(self, command: Alter, now: float | None) -> Receipt:
+        """Add an offset to what is planned; such commands in a row with nothing else between are one.
+
+        Raises:
+            PlanningError: If it's too old, or the limits leave no room for it; what was in force goes on then.
+        """
+        moment = self.moment(command, now, self.timeline.end)
+        t = moment.t
+        given = t if moment.issued is None else moment.issued
+        if t - given >= FRESH:
+            raise PlanningError(f"the offset is {t - given:.3g} s old; it moves nothing from {FRESH} s on")
+        before, known = self.timeline, self._offset_at(t)
+        if known is not None and not (known.frame is command.frame and _same_tool(known.tool, command.tool)):
+            known = None
+        if known is None:
+            number = self.ledger.newest + 1
+            known = Alteration(
+                number, before.version, t, before, t, altering.STILL, (), command.frame, command.tool, command.stays
+            )
+        elif given < known.given[-1][0] + altering.APART:
+            return self.ledger.receipt(known.command_id)
+        again = altering.remembered(known.given, command.offset, given)
+        known = known._replace(given=again, stays=command.stays)
+        after, known, notes = self._with_offset(before, known, t, before.version + 1)
+        late = text_of(notes)
+        receipt = Receipt(
+            known.command_id, moment.status, moment.issued, moment.asked, known.start, known.rejoins, None,
+            text_of(moment.notes + notes), after.version, hindrance=late,
+        )  # fmt: skip
+        self.alteration = known
+        if known.command_id in self.ledger:
+            self.timeline = after
+            self.ledger.rewrite(receipt, moment.notes + notes)
+            return receipt
+        edit = Edit(after, t, known.rejoins, before.state_before(t).q)
+        return self.accept(LedgerEntry(receipt, notes=moment.notes + notes), edit, t, appended=True)
+
+    def _offset_at(self, t: float) -> Alteration | None:
+        """The offset that's in force at a time [s]; None where there's none, or it has gone back to nothing."""
+        known = self.alteration
+        if known is None or known.version != self.timeline.version:
+            return None
+        return known if t < known.rejoins or known.course.at(np.array([t])).any() else None
+
+    def _with_offset(
+        self, timeline: Timeline, known: Alteration, t: float, version: int
+    ) -> tuple[Timeline, Alteration, Notes]:
+        """What is planned, with an offset from t on.
+
+        Args:
+            timeline: As it is until t.
+            known: The offset, and what is planned.
+            t: When it begins to count [s].
+            version: Of the timeline that's made.
+
+        Raises:
+            PlanningError: If the limits leave no room for it.
+        """
+        window = _window(known.planned, t, t + altering.LONGEST)
+        ends = max(known.given[-1][0] + altering.DELAY, t) if known.given else t
+        jerk = any(self.profile(owner) is Profile.JERK_LIMITED for owner in window.owners)
+        task = altering.Task(known.frame, known.tool, self.model, self.limits)
+        made = altering.alter(
+            window, timeline.state_before(t), known.course.at(np.array([t]))[0], known.given, task,
+            stays=known.stays and known.planned.end <= ends, jerk=jerk,
+        )  # fmt: skip
+        owners = [window.owners[i] or known.command_id for i in made.segments]
+        pieces = [
+            Piece([h], [row], owner)
+            for h, row, owner in zip(made.plan.durations.tolist(), made.plan.rows(), owners, strict=True)
+        ]
+        end = float(made.course.knots[-1])
+        after = _rejoined(timeline, known.planned, t, pieces, end, known.rejoins).with_version(version)
+        known = known._replace(version=version, course=made.course, rejoins=end)
+        return after, known, (Note(NoteCode.OFFSET_LATE),) if made.late else ()
+
+    def _under_offset(self, edit: Callable[[], Receipt], now: float | None) -> Receipt:
+        """Let an edit change what is planned while an offset is added to that.
+
+        Where the offset doesn't fit onto what it makes, the edit is one of the path with the offset, which ends.
+        """
+        known = None if now is None else self._offset_at(now)
+        if known is None or now is None:
+            return edit()
+        before, newest = self.timeline, self.ledger.newest
+        planned = _rejoined(before, known.planned, now, [], now, known.rejoins).with_version(before.version)
+        self.timeline = planned
+        receipt = edit()
+        if self.timeline is planned:
+            self.timeline = before
+            return receipt
+        known = known._replace(planned=self.timeline, rejoins=now)
+        try:
+            found = self._with_offset(self.timeline, known, now, self.timeline.version)
+        except PlanningError:
+            self.ledger.take_back(before.version)
+            self.timeline, self.ledger.newest = before, newest
+            return edit()
+        self.timeline, self.alteration, _ = found
+        return receipt
+
+    @override
+    def undo(self, now: float | None) -> Receipt | None:
+        last, known = self.ledger.last, self.alteration
+        fresh = last is None or known is None or known.command_id >= last.command_id
+        if now is None or last is None or known is None or fresh or now > last.at:
+            return super().undo(now)
+        # What lies before has another past since then: only what was still to come is put back.
+        timeline, version = self.timeline, self.timeline.version + 1
+        known = self._offset_at(now)
+        planned = _rejoined(timeline, last.before, now, [], now, inf).with_version(version)
+        if known is not None:
+            try:
+                found = self._with_offset(planned, known._replace(planned=planned, rejoins=now), now, version)
+            except PlanningError:
+                self.timeline, notes = self.brake(now, last.command_id)
+                return self.ledger.break_off(Change(version, last.command_id, now, None), notes)
+            planned, self.alteration, _ = found
+        self.timeline = planned
+        return self.ledger.take_back(version)
+
     def brake(self, t: float, command_id: int) -> tuple[Timeline, Notes]:
         """What is scheduled, with each joint braking from t on; and what must be said of it."""
         stop, notes = self.stop_at(t)
@@ -494,10 +644,10 @@ class Scheduler(BaseScheduler[Timeline]):
             issued = command.issued_at if command.issued_at is not None else now
             try:
                 if isinstance(command, Retime):
-                    return self._retime(command, receipt, now)
+                    return self._under_offset(partial(self._retime, command, receipt, now), now)
                 if isinstance(command, Cancel):
-                    return self._cancel(command, receipt, now)
-                return self._insert_via(command, receipt, now)
+                    return self._under_offset(partial(self._cancel, command, receipt, now), now)
+                return self._under_offset(partial(self._insert_via, command, receipt, now), now)
             except REFUSALS as error:
                 version = self.timeline.version
                 asked = command.execute_at
@@ -505,8 +655,10 @@ class Scheduler(BaseScheduler[Timeline]):
                     receipt.command_id, Status.REJECTED, issued, asked, reason=str(error), version=version
                 )
         try:
+            if isinstance(command, Alter):
+                return self.alter(command, now)
             if isinstance(command, ScaleTime):
-                return self.scale(command, now)
+                return self._under_offset(partial(self.scale, command, now), now)
             if isinstance(command, Stop):
                 return self.stop(command, now)
             return self.resume(command, now)
@@ -927,6 +1079,53 @@ class Scheduler(BaseScheduler[Timeline]):
                 self.note_profile(one.receipt.command_id, one.profile)
         if stand.steered is not None and stand.steered[0] in self.ledger:
             self.go_on_steering(*stand.steered)
+
+
+def _same_tool(one: Array | None, other: Array | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
+
+
+def _window(planned: Timeline, t: float, end: float) -> altering.Window:
+    """What is planned from t to an end [s]; after all of it, of standing there."""
+    index = planned.index_at(t)
+    starts, rows, owners, now = [t], [], [], t
+    while now < end:
+        begin, a, owner, until = segment_at(planned, index)
+        rows.append(shifted(a, t - begin) if now == t and t > begin > -inf else a)
+        owners.append(owner)
+        now = min(until, end)
+        starts.append(now)
+        index += 1
+    filled = np.zeros((len(rows), max(len(a) for a in rows), planned.dof))
+    for place, a in zip(filled, rows, strict=True):
+        place[: len(a)] = a
+    return altering.Window(np.array(starts), filled, owners)
+
+
+def _rejoined(
+    timeline: Timeline, planned: Timeline, t: float, pieces: list[Piece], s: float, rejoins: float
+) -> Timeline:
+    """A timeline until t, then pieces that last until s, then what is planned.
+
+    Args:
+        timeline: What stays until t [s].
+        planned: What comes from s on.
+        t: See above.
+        pieces: See above.
+        s: See above [s].
+        rejoins: From here on the timeline is as it's planned, so that the two share it [s].
+    """
+    index = planned.index_at(s)
+    while index < len(planned):
+        begin, a, owner, end = segment_at(planned, index)
+        if begin >= max(rejoins, s):
+            middle = 0.5 * (begin + end)
+            return timeline.edited(t, pieces, timeline.index_at(middle), begin)
+        late = max(s - begin, 0.0)
+        if end - begin - late > 0:
+            pieces.append(Piece([end - begin - late], [shifted(a, late) if late > 0 else a], owner))
+        index += 1
+    return timeline.edited(t, pieces)
 
 
 def _scheduled(receipt: Receipt, t: float) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from interfaces.teleop.samples import Gathering
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import (
+    Alter,
     Cancel,
     Command,
     InsertVia,
@@ -113,7 +114,7 @@ def resolved(command: Command, answer: Receipt, now: float) -> Command:
         return replace(command, target=target, issued_at=issued, execute_at=when)
     if isinstance(command, (Cancel, InsertVia)) and command.execute_at is None:
         return replace(command, issued_at=issued, execute_at=max(now, issued))
-    if isinstance(command, SteerCommand):
+    if isinstance(command, (SteerCommand, Alter)):
         return replace(command, issued_at=issued, execute_at=max(now, issued, command.execute_at or now))
     if isinstance(command, (ScaleTime, Stop, Resume)):
         return replace(command, issued_at=issued, execute_at=answer.execute_at)
