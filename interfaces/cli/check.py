@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from interfaces.cli.options import RobotName, val_robot
+from interfaces.cli.options import DialectName, RobotName, dialect_of, val_robot
 from interfaces.cli.run import text_of
 from robots.robot import USUAL
 
@@ -37,6 +37,7 @@ def check(
         bool, typer.Option("--static", help="Only read the programs; don't plan what one would do.")
     ] = False,
     name: RobotName = USUAL,
+    dialect: DialectName = "",
     as_json: Annotated[bool, typer.Option("--json", help="Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
@@ -45,7 +46,7 @@ def check(
     """
     from interfaces.val2.check import check_files
 
-    checked = check_files([(text_of(path), path.name) for path in programs])
+    checked = check_files([(text_of(path), path.name) for path in programs], dialect_of(dialect))
     found = [(path, finding) for path, (_, some) in zip(programs, checked, strict=True) for finding in some]
     sources = [source for source, _ in checked if source is not None]
     if not static and not _wrong(found):

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import RobotName, val_robot
+from interfaces.cli.options import DialectName, RobotName, dialect_of, val_robot
 from interfaces.system import module_process, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from interfaces.val2.monitor.control import Control
     from interfaces.val2.monitor.monitor import TerminalMonitor
     from interfaces.val2.motion import Arm
+    from interfaces.val2.values import Dialect
     from robots.robot import Robot
     from vrs.clock import Clock
 
@@ -55,6 +56,7 @@ def console(
     files: Annotated[
         Path, typer.Option("--files", metavar="DIR", help="Where LOAD and STORE find files.")
     ] = Path(),
+    dialect: DialectName = "",
 ) -> None:
     """Move an arm by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""
     from interfaces.link import delay_profile
@@ -71,18 +73,19 @@ def console(
     if not files.is_dir():
         raise InvalidValueError("files", str(files), "a directory")
     delay_profile(delay)
+    spoken = dialect_of(dialect)
     if alone:
-        _alone(robot, files)
+        _alone(robot, files, spoken)
     elif connect is not None:
-        _connected(connect, token_file, files)
+        _connected(connect, token_file, files, spoken)
     else:
         typer.echo("vrs: starting both robots ..", err=True)
         with local_server(["--robot", name, "--delay", delay, "--link-loss", "hold"]) as url:
             typer.echo(f"vrs: {url}/view shows both robots", err=True)
-            _connected(url, None, files)
+            _connected(url, None, files, spoken)
 
 
-def _alone(robot: Robot, files: Path) -> None:
+def _alone(robot: Robot, files: Path, dialect: Dialect | None) -> None:
     from interfaces.val2.monitor.control import Control
     from interfaces.val2.motion import arm_for
     from vrs.clock import ManualClock, WallClock
@@ -90,10 +93,11 @@ def _alone(robot: Robot, files: Path) -> None:
 
     model = robot.arm
     engine = Engine(model, q=home(model), clock=ManualClock(0.0))
-    _converse(arm_for(engine), Control(), WallClock(), files, f"{software()}, a virtual {robot.name} alone")
+    what = f"{software()}, a virtual {robot.name} alone"
+    _converse(arm_for(engine), Control(), WallClock(), files, dialect, what)
 
 
-def _connected(url: str, token_file: Path | None, files: Path) -> None:
+def _connected(url: str, token_file: Path | None, files: Path, dialect: Dialect | None) -> None:
     from interfaces import connect
     from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
@@ -102,12 +106,11 @@ def _connected(url: str, token_file: Path | None, files: Path) -> None:
 
     token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
     with connect(url, token=token, name="vrs console") as connection:
-        _converse(
-            arm_for(connection), LeaseControl(connection), connection, files, f"{software()}, connected to {url}"
-        )
+        what = f"{software()}, connected to {url}"
+        _converse(arm_for(connection), LeaseControl(connection), connection, files, dialect, what)
 
 
-def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) -> None:
+def _converse(arm: Arm, control: Control, clock: Clock, files: Path, dialect: Dialect | None, what: str) -> None:
     """Let a person, or a pipe, work at the monitor."""
     import asyncio
 
@@ -115,8 +118,10 @@ def _converse(arm: Arm, control: Control, clock: Clock, files: Path, what: str) 
     from interfaces.val2.monitor.control import SharedController
     from interfaces.val2.monitor.files import Files
     from interfaces.val2.monitor.monitor import TerminalMonitor
+    from interfaces.val2.values import VPLUS
 
     controller = Controller(arm, parameters=arm.parameters, now=clock.now())
+    controller.parameters["VPLUS"] = float(dialect is VPLUS)
     typed = sys.stdin.isatty() and sys.stdout.isatty()
     shared = SharedController(controller, control)
     monitor = TerminalMonitor(shared, Files(files, anywhere=True), what, queues_commands=not typed)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
+    from interfaces.val2.values import Dialect
     from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
@@ -49,6 +50,14 @@ Order: TypeAlias = Annotated[
 ]
 Out: TypeAlias = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Where report.html, summary.json and run.mcap go.")
+]
+DialectName: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--dialect",
+        metavar="val2|vplus",
+        help="Angles of files that don't say: val2's O, A, T (unless given), or vplus's yaw, pitch, roll.",
+    ),
 ]
 VAL_JOINTS = 6
 """Joints that VAL-II's places have."""
@@ -147,6 +156,19 @@ def val_robot(name: str) -> Robot:
     if not speaks_val(robot):
         raise InvalidValueError("robot", name, f"an arm of {VAL_JOINTS} joints that turn, as VAL-II has places for")
     return robot
+
+
+def dialect_of(name: str) -> Dialect | None:
+    """The dialect of a name; None for no name.
+
+    Raises:
+        InvalidValueError: If there's none of that name.
+    """
+    from interfaces.val2.source import DIALECTS
+
+    if name.upper() not in (*DIALECTS, ""):
+        raise InvalidValueError("dialect", name, "val2 or vplus")
+    return DIALECTS.get(name.upper())
 
 
 OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose")

@@ -20,12 +20,13 @@ from interfaces.cli.demo import (
     show,
     write,
 )
-from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, val_robot
+from interfaces.cli.options import Delay, DialectName, Offset, Order, Out, RobotName, dialect_of, val_robot
 from interfaces.system import read_within
 from robots.robot import USUAL
 
 if TYPE_CHECKING:
     from interfaces.val2.source import SourceFile
+    from interfaces.val2.values import Dialect
 
 MAX_BYTES = 4 * 1024 * 1024
 
@@ -44,6 +45,7 @@ def run(
     seed: Annotated[
         int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random, RANDOM too.")
     ] = DEFAULT_SEED,
+    dialect: DialectName = "",
     out: Out = Path("out"),
     limit: Annotated[
         float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
@@ -63,7 +65,7 @@ def run(
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, robot = joined([read(path) for path in programs], program), val_robot(name)
+    source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
@@ -81,16 +83,17 @@ def run(
         raise played.error
 
 
-def read(path: Path) -> SourceFile:
-    """Read a file of programs.
+def read(path: Path, dialect: Dialect | None = None) -> SourceFile:
+    """Read a file of programs; in a dialect's angles, as far as it doesn't say.
 
     Raises:
         FormatError: If it can't be read, or is longer than 4 MiB.
         ValError: If it isn't VAL-II.
     """
     from interfaces.val2.source import parse_file
+    from interfaces.val2.values import VAL2
 
-    return parse_file(text_of(path), str(path))
+    return parse_file(text_of(path), str(path), dialect or VAL2)
 
 
 def text_of(path: Path) -> str:

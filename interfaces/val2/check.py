@@ -21,13 +21,14 @@ from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
 from interfaces.val2.signals import legal, settable
-from interfaces.val2.source import SourceFile, read_all
+from interfaces.val2.source import SourceFile, read_all, says_dialect
 from interfaces.val2.structure import Structure, StructureBlock, survey
 from interfaces.val2.syntax import (
     BLANK,
     Apply,
     Compound,
     Expression,
+    Format,
     Instruction,
     Program,
     Variable,
@@ -35,6 +36,7 @@ from interfaces.val2.syntax import (
     literal,
     parts,
 )
+from interfaces.val2.values import VAL2, VPLUS, Dialect
 from robots import puma560
 from vrs.checks import did_you_mean
 from vrs.engine import Engine
@@ -56,16 +58,19 @@ def check_text(text: str, name: str) -> tuple[SourceFile | None, list[CheckFindi
     return only
 
 
-def check_files(files: Sequence[tuple[str, str]]) -> list[tuple[SourceFile | None, list[CheckFinding]]]:
+def check_files(
+    files: Sequence[tuple[str, str]], dialect: Dialect | None = None
+) -> list[tuple[SourceFile | None, list[CheckFinding]]]:
     """Read files and check them, each with the programs and values of all.
 
     Args:
         files: Texts and names.
+        dialect: In which their angles are, as far as they don't say; VAL-II's unless given.
 
     Returns:
         Of each what it holds, None if not every line could be read; and what was found, in the order of its lines.
     """
-    read = [read_all(*file) for file in files]
+    read = [read_all(*file, dialect or VAL2) for file in files]
     names, twice, checked = _Names(read), set[str](), list[tuple[SourceFile | None, list[CheckFinding]]]()
     for (text, _), (source, unreadable, _) in zip(files, read, strict=True):
         found = [_error(error) for error in unreadable.values()]
@@ -77,6 +82,7 @@ def check_files(files: Sequence[tuple[str, str]]) -> list[tuple[SourceFile | Non
             twice.add(program.name)
             found += _Checker(program, names, unreadable.keys()).findings()
         found += _alike_names(text)
+        found += _strange_angles(source, said=dialect is not None or says_dialect(text))
         checked.append((None if unreadable else source, sorted(found, key=_order)))
     return checked
 
@@ -276,6 +282,52 @@ def _alike_names(text: str) -> Iterator[CheckFinding]:
                 detail = f"{name} is the same as {other}: {SIGNIFICANT} characters count"
                 first[counted] = name
                 yield _warning(ValError("Long names", detail, place=TextPosition(number, found.start() + 1)))
+
+
+_STRANGE: Final = {
+    VAL2: ("A is -90 to 90 deg; a line ;VPLUS says that the angles are yaw, pitch, roll", 90.0, 1.0),
+    VPLUS: ("pitch is 0 to 180 deg; a line ;VAL2 says that the angles are O, A, T", 0.0, -1.0),
+}  # fmt: skip
+"""What second angles a dialect prints, and from where on, on which side, one looks like the other dialect's."""
+
+
+_VPLUS_ALONE: Final = frozenset(["ATTACH", "AUTO", "DETACH", "EXECUTE", "FCLOSE", "GLOBAL", "LOCAL", "READ", "SELECT", "WRITE"])
+"""Instructions that no program of VAL-II's has."""
+
+
+def _strange_angles(source: SourceFile, *, said: bool) -> Iterator[CheckFinding]:
+    """A warning where the first angles of a file look like those of the other dialect.
+
+    Args:
+        source: The file.
+        said: Whether somebody has said which they are; else instructions that V+ alone has look like it, too.
+    """
+    angles = [(entry.second, entry.variable.at, source.dialect) for entry in source.locations]
+    words: list[Instruction] = []
+    for program in source.programs:
+        for i in (step.statement for step in program.steps):
+            words += [i] if i.keyword in _VPLUS_ALONE else []
+            operands = (one for one in i.operands if not isinstance(one, Format | None))
+            inner = [part for operand in operands for part in parts(operand)]
+            angles += [
+                (literal(part.arguments[4]) if len(part.arguments) > 4 else None, part.at, program.dialect)
+                for part in inner
+                if isinstance(part, Apply) and part.function == "TRANS" and len(part.arguments) > 3
+            ]
+    for second, at, dialect in angles:
+        why, edge, side = _STRANGE[dialect]
+        if second is not None and (second - edge) * side > _ROUNDED:
+            yield _warning(ValError("Angles of another dialect", f"{second:.9g}: {why}", place=at))
+            return
+    for _, at, dialect in angles:
+        if words and dialect is VAL2 and not said:
+            detail = f"read as O, A, T, and {words[0].keyword} is V+'s; a line ;VPLUS, or ;VAL2, says which"
+            yield _warning(ValError("Angles of another dialect", detail, place=at))
+            return
+
+
+_ROUNDED: Final = 1e-3
+"""Angles of a location that was written with few decimals [deg]."""
 
 
 def _written(i: Instruction) -> Iterator[Variable]:

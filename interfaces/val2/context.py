@@ -14,6 +14,7 @@ from interfaces.val2.motion.arm import Arm
 from interfaces.val2.rows import PARAMETERS, SWITCHES
 from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import Program
+from interfaces.val2.values import VAL2, VPLUS, Dialect
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +191,11 @@ class Context:
     compiled: dict[str, Code] = field(default_factory=dict)
     """Programs that were compiled, by name."""
     warned: set[Warned] = field(default_factory=set)
+
+    @property
+    def dialect(self) -> Dialect:
+        """In which angles are at the prompt, and in files that don't say."""
+        return VPLUS if self.parameters["VPLUS"] else VAL2
 
     def code(self, name: str, at: TextPosition = NOWHERE) -> Code:
         """A program, compiled anew where it was changed.

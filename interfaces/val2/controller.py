@@ -168,7 +168,7 @@ class Controller(Context):
         if self._do is not None or (self.running and not runs_beside_program(step)):
             raise ValError("Program already running")
         self.now = max(now, self.now)
-        code = compiled(Program("", (), (step,)), self)
+        code = compiled(Program("", steps=(step,), dialect=self.dialect), self)
         if not self.running:
             self.warned.clear()
             self._do, self._due = Task(self, code, [], cycles=1), True

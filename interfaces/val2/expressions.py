@@ -19,7 +19,7 @@ from interfaces.val2.functions import FUNCTIONS, TRUE, row_of
 from interfaces.val2.memory import MOST_DIMENSIONS, Key, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.rows import Kind, OperandSlot
 from interfaces.val2.syntax import Apply, Compound, Expression, Format, Number, Text, Variable
-from interfaces.val2.values import Transformation, Value
+from interfaces.val2.values import Dialect, Transformation, Value
 
 Closure: TypeAlias = Callable[[Slots], Any]
 Real: TypeAlias = Callable[[Slots], float]
@@ -59,14 +59,20 @@ def kind_of(expression: Expression, known: Mapping[str, str] = {}) -> str:
 class Expressions:
     """Makes closures of the expressions of one program."""
 
-    def __init__(self, context: Context, scope: Mapping[str, int | VariableSlot] | None = None) -> None:
+    def __init__(
+        self,
+        context: Context,
+        scope: Mapping[str, int | VariableSlot] | None = None,
+        dialect: Dialect | None = None,
+    ) -> None:
         """Bind to a context.
 
         Args:
             context: Holds the memory.
             scope: Where the program's own names are: numbers in the call's slots, or slots that last.
+            dialect: In which angles are; that of the prompt unless given.
         """
-        self.context = context
+        self.context, self.dialect = context, context.dialect if dialect is None else dialect
         self._scope = scope or {}
 
     # Names.
@@ -240,6 +246,8 @@ class Expressions:
         parts = self.operands(slots, given, row.name, e.at)
         if "context" in row.tags:
             return _placed(partial(act, self.context), parts, e.at)
+        if "dialect" in row.tags:
+            return _placed(partial(act, self.dialect), parts, e.at)
         return _placed(act, parts, e.at) if parts else _constant(act())
 
     def idle(self, e: Apply, value: float | str) -> Closure:
@@ -327,7 +335,7 @@ def _setting(x: Expressions, e: Apply) -> Callable[[Slots], float]:
 
 def _encode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
     items = [_constant(a) if isinstance(a, Format) else x.value(a) for a in e.arguments if a is not None]
-    return lambda s: formats.spelled([item(s) for item in items])[0]
+    return lambda s: formats.spelled([item(s) for item in items], x.dialect)[0]
 
 
 def _decode(x: Expressions, e: Apply) -> Callable[[Slots], str]:

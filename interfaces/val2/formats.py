@@ -16,7 +16,7 @@ from typing import Final
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.syntax import Format
-from interfaces.val2.values import PrecisionPoint, Transformation, Value, to_oat
+from interfaces.val2.values import Dialect, Value
 
 NUMBERS: Final = "DFGEIHO"
 """Formats of numbers."""
@@ -73,8 +73,8 @@ def _clean(value: float, decimals: int) -> float:
     return 0.0 if round(value, decimals) == 0.0 else value
 
 
-def spelled(items: Sequence[Value | Format]) -> tuple[str, bool]:
-    """The text of items, and whether a line end belongs after it.
+def spelled(items: Sequence[Value | Format], dialect: Dialect) -> tuple[str, bool]:
+    """The text of items, angles in a dialect's, and whether a line end belongs after it.
 
     Raises:
         ValError: If a format isn't one of these.
@@ -82,7 +82,7 @@ def spelled(items: Sequence[Value | Format]) -> tuple[str, bool]:
     parts, form, ends = [], _DEFAULT, True
     for item in items:
         if not isinstance(item, Format):
-            parts.append(_value(item, form))
+            parts.append(_value(item, form, dialect))
             continue
         count = min(item.width if item.width is not None else 1, WIDEST)
         match item.code:
@@ -105,14 +105,12 @@ def spelled(items: Sequence[Value | Format]) -> tuple[str, bool]:
     return "".join(parts), ends
 
 
-def _value(value: Value, form: Format) -> str:
+def _value(value: Value, form: Format, dialect: Dialect) -> str:
     if isinstance(value, str):
         return value
-    if isinstance(value, Transformation):
-        return "".join(number(v, form) for v in to_oat(value))
-    if isinstance(value, PrecisionPoint):
-        return "".join(number(v, form) for v in value.joints)
-    return number(value, form)
+    if isinstance(value, float):
+        return number(value, form)
+    return "".join(number(v, form) for v in dialect.numbers(value))
 
 
 _NUMBER: Final = re.compile(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)(E[+-]?\d+)?", re.IGNORECASE | re.ASCII)

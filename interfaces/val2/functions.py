@@ -21,12 +21,12 @@ from interfaces.val2.signals import group
 from interfaces.val2.syntax import Apply
 from interfaces.val2.values import (
     NULL,
+    Dialect,
     PrecisionPoint,
     Transformation,
     about_x,
     about_y,
     about_z,
-    from_oat,
 )
 
 TRUE: Final = -1.0
@@ -121,6 +121,12 @@ def _mid(text: str, first: float, length: float) -> str:
     if i < 1 or n < 0:
         raise ValError("Illegal value", f"$MID from {i}, {n} characters")
     return text[i - 1 : i - 1 + n]
+
+
+def _trans(dialect: Dialect, x: float, y: float, z: float, *angles: float | None) -> Transformation:
+    """Angles that were left out are those of no turn."""
+    o, a, t = (none if angle is None else angle for angle, none in zip(angles, dialect.offsets, strict=True))
+    return dialect.transformation(x, y, z, o, a, t)
 
 
 def _shift(frame: Transformation, *way: float) -> Transformation:
@@ -247,8 +253,9 @@ _FUNCTIONS: Final = (
     Form("$TRUNCATE", "text:string -> string", "A string up to its first character of code 0.", "V+",
          lambda text: text.partition("\0")[0]),
     # Locations.
-    Form("TRANS", "x?=0, y?=0, z?=0, o?=90, a?=-90, t?=0 -> frame",
-         "A transformation [mm, deg]; without angles, no turn.", "VAL-II", from_oat),
+    Form("TRANS", "x?=0, y?=0, z?=0, o?, a?, t? -> frame",
+         "A transformation [mm, deg], in V+ by yaw, pitch, roll; without angles, no turn.", "VAL-II", _trans,
+         tags="dialect"),
     Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
          _shift, usage="SHIFT(a BY dx, dy, dz)"),
     Form("SCALE", "a:frame, factor -> frame", "A location whose X, Y and Z are multiplied by a factor.", "V+",

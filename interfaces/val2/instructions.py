@@ -52,7 +52,7 @@ from interfaces.val2.syntax import (
     literal,
     parts,
 )
-from interfaces.val2.values import NULL, Location, Transformation, about_z, to_oat
+from interfaces.val2.values import NULL, Location, Transformation, about_z
 
 Do: TypeAlias = Callable[..., object]
 """Does what an instruction wants, of the context, the instruction, and the values of its operands."""
@@ -82,7 +82,7 @@ class ProgramCompiler(Expressions):
                     self.names += 1
                 else:
                     scope[name] = context.memory.own(program.name, name)
-        super().__init__(context, scope)
+        super().__init__(context, scope, program.dialect)
 
     def keep(self, n: int) -> int:
         """Number of the slot in which the FOR at a step keeps its limits."""
@@ -641,8 +641,7 @@ def _decompose(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     first = [x.of_kind("real", k) for k in target.indices] or [lambda _: 0.0]
 
     def decompose(s: Slots) -> int:
-        location = read(s)
-        values = to_oat(location) if isinstance(location, Transformation) else location.joints
+        values = x.dialect.numbers(read(s))
         *before, start = [index(f(s), target.at) for f in first]
         array = s[place] if isinstance(place, int) else place
         for k, value in enumerate(values, start):
@@ -661,7 +660,7 @@ def _type(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     items = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
 
     def type_(s: Slots) -> int:
-        text, ends = formats.spelled([o if isinstance(o, Format) else o(s) for o in items])
+        text, ends = formats.spelled([o if isinstance(o, Format) else o(s) for o in items], x.dialect)
         if context.switches["MESSAGES"]:
             context.events.append(Typed(text + "\n" if ends else text))
         return context.go_on(n + 1)

@@ -80,7 +80,7 @@ class Form:
             rule: How an instruction's line goes on behind its keyword: what `grammar.lark` has behind this word, in
                 upper case; operands between commas, and words, if nothing is said.
             tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
-                and its name can't be a variable's), `context` (its first argument is the context), `idle` (it's
+                and its name can't be a variable's), `context`, `dialect` (its first argument is that), `idle` (it's
                 recognised, but has no meaning here: 0, or an empty string); of an instruction `opens`, `closes` (a
                 structure; both: divides one), `program` (it can't stand alone), `beside` (DO may do it while a
                 program runs); of a monitor command what `monitor/commands.py` says.
@@ -157,6 +157,9 @@ PARAMETERS: Final = {
     for row in (
         Setting("HAND.TIME", 0.05, "How long OPENI, CLOSEI and RELAXI take.", "VAL-II", 0.0, 60.0, "s"),
         Setting("HAND.LOAD", 0.0, "What the real hand holds while it's closed.", "ours", 0.0, 20.0, "kg"),
+        Setting(
+            "VPLUS", 0.0, "Angles of the prompt, and of files that don't say: 1 is V+'s yaw, pitch, roll.", "ours"
+        ),
     )
 }
 """What PARAMETER sets."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Generator, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Final, TypeAlias
 
@@ -20,8 +20,8 @@ from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.signals import SignalRule
-from interfaces.val2.syntax import BLANK, Apply, Expression, Number, Program, Step, Text, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
+from interfaces.val2.syntax import BLANK, Apply, Expression, Instruction, Number, Program, Step, Text, Variable
+from interfaces.val2.values import VAL2, VPLUS, Dialect, PrecisionPoint, Transformation, Value
 from vrs.checks import closest, did_you_mean
 
 DECIMALS: Final = 9
@@ -34,6 +34,10 @@ _SECTIONS: Final = (*_PREFIXES, ".SIGNALS")
 DIRECTIVES: Final = (".PROGRAM", ".END", *_SECTIONS)
 """What lines of a file may begin with, beside what programs hold."""
 _DIRECTIVE: Final = re.compile(r"\s*(\.[A-Za-z]+)(?![A-Za-z0-9_.])", re.ASCII)
+DIALECTS: Final = {"VAL2": VAL2, "VPLUS": VPLUS}
+"""Comments, alone on a line, that say in which dialect's angles it goes on; and what `--dialect` takes."""
+_DIRECTIVES: Final = {dialect: word for word, dialect in DIALECTS.items()}
+_DIALECT: Final = re.compile(rf"\s*;\s*({'|'.join(DIALECTS)})\s*", re.IGNORECASE)
 _ELEMENT: Final = re.compile(r"[0-9]{1,6}")
 MOST_ERRORS: Final = 100
 """Lines that can't be read, of which is told."""
@@ -61,6 +65,8 @@ class NamedValue:
 
     variable: Variable
     value: Value
+    second: float | None = field(default=None, compare=False)
+    """The second angle of a transformation, as it was written [deg]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +80,8 @@ class SourceFile:
     reals: tuple[NamedValue, ...] = ()
     strings: tuple[NamedValue, ...] = ()
     signals: tuple[SignalRule, ...] = ()
+    dialect: Dialect = VAL2
+    """In which its locations are printed."""
 
     @property
     def values(self) -> tuple[NamedValue, ...]:
@@ -92,26 +100,27 @@ Reading: TypeAlias = Generator[int, None, SourceFile]
 """Reads a text in steps: yields how many characters each took, and returns what the text holds."""
 
 
-def parse_file(text: str, name: str) -> SourceFile:
+def parse_file(text: str, name: str, dialect: Dialect = VAL2) -> SourceFile:
     """What the text of a file holds.
 
     Args:
         text: The text; lines end as they like.
         name: Name of the file; a text that begins without `.PROGRAM` is a program of its name.
+        dialect: In which its angles are, as far as it doesn't say.
 
     Raises:
         ValError: If it can't be read; its place is in the file.
     """
-    return _whole(read_file(text, name))
+    return _whole(read_file(text, name, dialect=dialect))
 
 
-def parse_program(text: str) -> Program:
-    """The program of a text from `.PROGRAM` on; `.END` may be missing.
+def parse_program(text: str, dialect: Dialect = VAL2) -> Program:
+    """The program of a text from `.PROGRAM` on, in a dialect's angles; `.END` may be missing.
 
     Raises:
         ValError: If it isn't one program.
     """
-    program, *others = parse_file(text, "").programs or (None,)
+    program, *others = parse_file(text, "", dialect).programs or (None,)
     if program is None or directive(lines_of(text)[program.at.line - 1]) != ".PROGRAM":
         raise syntax_error("allowed: .PROGRAM name(arguments)", program.at.line if program else 1, 1)
     if others:
@@ -149,7 +158,13 @@ def joined(files: Sequence[SourceFile], program: str = "") -> SourceFile:
         latest(entry for file in files for entry in file.reals),
         latest(entry for file in files for entry in file.strings),
         tuple(rule for file in files for rule in file.signals),
+        files[0].dialect,
     )
+
+
+def says_dialect(text: str) -> bool:
+    """Whether a line of a text says in which dialect's angles it is."""
+    return any(_DIALECT.fullmatch(line) for line in text.splitlines() if ";" in line)
 
 
 def directive(line: str) -> str:
@@ -175,7 +190,9 @@ def _whole(reading: Reading) -> SourceFile:
             return source
 
 
-def read_file(text: str, name: str, unreadable: dict[int, ValError] | None = None) -> Reading:
+def read_file(
+    text: str, name: str, unreadable: dict[int, ValError] | None = None, *, dialect: Dialect = VAL2
+) -> Reading:
     """Read a file in steps, as `parse_file` does at once.
 
     Args:
@@ -184,8 +201,9 @@ def read_file(text: str, name: str, unreadable: dict[int, ValError] | None = Non
         unreadable: Takes the error of each line that can't be read, by its number; in such a line's place stands
             one that is the same part of a structure, with the same label. Without it the first error is raised, but
             a line whose word is no instruction is kept: it's an error where a program comes there.
+        dialect: In which its angles are, as far as it doesn't say.
     """
-    file = _File(name)
+    file = _File(name, dialect)
     for n, line in enumerate(lines_of(text), 1):
         yield len(line)
         try:
@@ -203,10 +221,10 @@ def read_file(text: str, name: str, unreadable: dict[int, ValError] | None = Non
 class _File:
     """What has been read of a file, line by line."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, dialect: Dialect) -> None:
+        self._name, self._dialect = name, dialect
         self._programs: dict[str, Program] = {}
-        self._entries: dict[str, dict[Variable, Value]] = {word: {} for word in _PREFIXES}
+        self._entries: dict[str, dict[Variable, NamedValue]] = {word: {} for word in _PREFIXES}
         self._rules: list[SignalRule] = []
         self._section = ""
         self._steps: list[Step] = []
@@ -220,6 +238,8 @@ class _File:
             ValError: If it can't be read.
         """
         word = directive(line)
+        if stated := _DIALECT.fullmatch(line):
+            self._speak(DIALECTS[stated[1].upper()])
         if word == ".END" and self.program is not None:
             self.end_program(trimmed=False)
         elif word and word not in DIRECTIVES:
@@ -235,8 +255,17 @@ class _File:
             if strict and (error := undefined(self._steps[-1].statement)) is not None:
                 self._steps.pop()
                 raise error
+            match self._steps[-1].statement:
+                case Instruction("PARAMETER", (Number(value),), ("VPLUS",)):
+                    self._speak(VPLUS if value else VAL2)
         elif (code := split_comment(line, number)[0]).strip():
             self._value(code, line, number, strict=strict)
+
+    def _speak(self, dialect: Dialect) -> None:
+        """Read the program that is being read, and what comes, in a dialect."""
+        self._dialect = dialect
+        if self.program is not None:
+            self.program = replace(self.program, dialect=dialect)
 
     def _directive(self, word: str, line: str, number: int) -> None:
         self._section = word if word in _SECTIONS else ""
@@ -252,8 +281,8 @@ class _File:
         if self._section == ".SIGNALS":
             self._rules.append(parse_rule(code, number))
         elif self._section:
-            variable, value = _entry(self._section, code, number)
-            self._entries[self._section][variable] = value
+            entry = _entry(self._section, code, number, self._dialect)
+            self._entries[self._section][entry.variable] = entry
         elif self._programs:
             raise syntax_error("allowed: .PROGRAM name(arguments)", number, indented(code) + 1)
         else:
@@ -264,7 +293,7 @@ class _File:
     def _begin(self, program: Program) -> None:
         if program.name in self._programs:
             raise ValError("Duplicate program", program.name, place=program.at)
-        self.program, self._steps = program, []
+        self.program, self._steps = replace(program, dialect=self._dialect), []
 
     def end_program(self, *, trimmed: bool = True) -> None:
         """Put the program away that is being read; blank lines at its end don't count where no `.END` says so."""
@@ -286,10 +315,9 @@ class _File:
 
     def source(self) -> SourceFile:
         """What the file holds."""
-        locations, reals, strings = (
-            tuple(map(NamedValue, given, given.values())) for given in self._entries.values()
-        )
-        return SourceFile(self._name, tuple(self._programs.values()), locations, reals, strings, tuple(self._rules))
+        programs, rules = tuple(self._programs.values()), tuple(self._rules)
+        locations, reals, strings = (tuple(given.values()) for given in self._entries.values())
+        return SourceFile(self._name, programs, locations, reals, strings, rules, self._dialect)
 
 
 def _variable(code: str, line: int, prefixes: tuple[str, ...]) -> tuple[Variable, int]:
@@ -329,13 +357,16 @@ def _numbers(code: str, begin: int, line: int, count: int) -> tuple[float, ...]:
     return tuple(values)
 
 
-def _entry(section: str, code: str, line: int) -> tuple[Variable, Value]:
+def _entry(section: str, code: str, line: int, dialect: Dialect) -> NamedValue:
     variable, begin = _variable(code, line, _PREFIXES[section])
     if section == ".STRINGS":
-        return variable, _constant(grammar.read(" " * begin + code[begin:], "expression", line))
+        return NamedValue(variable, _constant(grammar.read(" " * begin + code[begin:], "expression", line)))
     if section == ".REALS":
-        return variable, _numbers(code, begin, line, 1)[0]
-    return variable, location_of(variable, _numbers(code, begin, line, 6))
+        return NamedValue(variable, _numbers(code, begin, line, 1)[0])
+    values = _numbers(code, begin, line, 6)
+    if variable.prefix == "#":
+        return NamedValue(variable, PrecisionPoint(values))
+    return NamedValue(variable, dialect.transformation(*values), values[4])
 
 
 def _constant(expression: Expression) -> str:
@@ -349,21 +380,6 @@ def _constant(expression: Expression) -> str:
     raise ValError("Syntax error", "allowed: strings and $CHR(code) with + between them", place=expression.at)
 
 
-def location_of(variable: Variable, values: Sequence[float]) -> Location:
-    """The location of six numbers: joints for a precision point, else X, Y, Z, O, A, T."""
-    if variable.prefix == "#":
-        return PrecisionPoint(tuple(values))
-    x, y, z, o, a, t = values
-    return from_oat(x, y, z, o, a, t)
-
-
-def numbers_of(location: Location) -> tuple[float, ...]:
-    """The six numbers of a location, of a transformation to `DECIMALS`."""
-    if isinstance(location, PrecisionPoint):
-        return location.joints
-    return tuple(round(value, DECIMALS) + 0.0 for value in to_oat(location))
-
-
 def print_rule(rule: SignalRule) -> str:
     """The line of a rule."""
     shown = f"{rule.signal} = {print_expression(rule.value)}"
@@ -373,19 +389,31 @@ def print_rule(rule: SignalRule) -> str:
 
 
 def print_file(source: SourceFile) -> str:
-    """The text of a file; a section without entries is left out."""
-    parts = [print_program(program) for program in source.programs]
-    parts.append(_printed(".LOCATIONS", [_row(e, " ".join(map(number, _numbers_of(e)))) for e in source.locations]))
+    """The text of a file; a section without entries is left out. What isn't VAL-II's is told by a directive."""
+    parts, spoken = [], VAL2
+    for dialect, text in (
+        *((program.dialect, print_program(program)) for program in source.programs),
+        (source.dialect if source.locations else spoken, ""),
+    ):
+        parts += [f";{_DIRECTIVES[dialect]}\n"] if dialect != spoken else []
+        parts.append(text)
+        spoken = dialect
+    located = [_row(e, " ".join(map(number, numbers_of(e, source.dialect)))) for e in source.locations]
+    parts.append(_printed(".LOCATIONS", located))
     parts.append(_printed(".REALS", [_row(e, number(float(e.value))) for e in source.reals]))  # type: ignore[arg-type]
     parts.append(_printed(".STRINGS", [_row(e, print_expression(Text(str(e.value)))) for e in source.strings]))
     parts.append(_printed(".SIGNALS", [print_rule(rule) for rule in source.signals]))
     return "".join(parts)
 
 
-def _numbers_of(entry: NamedValue) -> tuple[float, ...]:
-    if not isinstance(entry.value, Transformation | PrecisionPoint):
-        raise ValError("Mixed types", f"{print_expression(entry.variable)} isn't a location")
-    return numbers_of(entry.value)
+def numbers_of(entry: NamedValue, dialect: Dialect) -> tuple[float, ...]:
+    """The six numbers of a location, of a transformation to `DECIMALS`."""
+    match entry.value:
+        case PrecisionPoint(joints):
+            return joints
+        case Transformation():
+            return tuple(round(value, DECIMALS) + 0.0 for value in dialect.numbers(entry.value))
+    raise ValError("Mixed types", f"{print_expression(entry.variable)} isn't a location")
 
 
 def _row(entry: NamedValue, value: str) -> str:
@@ -396,11 +424,11 @@ def _printed(section: str, rows: list[str]) -> str:
     return "\n".join([section, *rows, ".END", ""]) if rows else ""
 
 
-def read_all(text: str, name: str) -> tuple[SourceFile, dict[int, ValError], set[str]]:
+def read_all(text: str, name: str, dialect: Dialect = VAL2) -> tuple[SourceFile, dict[int, ValError], set[str]]:
     """What can be read of a file; the error of each line that can't be, by its number; the names in those lines."""
     errors: dict[int, ValError] = {}
     try:
-        source = _whole(read_file(text, name, errors))
+        source = _whole(read_file(text, name, errors, dialect=dialect))
     except ValError as error:
         return SourceFile(name), errors or {1: error.at(place=TextPosition(1, 1))}, set()
     lines = lines_of(text) if errors else []

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 from interfaces.val2.errors import NOWHERE, TextPosition
+from interfaces.val2.values import VAL2, Dialect
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,3 +162,5 @@ class Program:
     comment: str | None = None
     """Of the `.PROGRAM` line."""
     at: TextPosition = field(default=NOWHERE, compare=False)
+    dialect: Dialect = VAL2
+    """In which its angles are."""

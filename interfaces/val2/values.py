@@ -1,8 +1,11 @@
 """Values of VAL-II, and how they stand for poses and joints.
 
-Lengths are millimetres and angles degrees, as everywhere in the language. O, A and T are Euler angles:
-R = Rz(O - 90) Ry(A + 90) Rz(T), in degrees. VAL's world is the base frame turned by 180 degrees about the waist,
-and its hand the last link turned by 180 degrees about its own axis, at the flange.
+Lengths are millimetres and angles degrees, as everywhere in the language. A dialect says what the three angles of
+a transformation are: VAL-II's O, A, T turn it by R = Rz(O - 90) Ry(A + 90) Rz(T), V+'s yaw, pitch, roll by
+R = Rz Ry Rz as they are. Values are poses, so that files of both dialects mean what they say beside each other.
+
+VAL's world is the base frame turned by 180 degrees about the waist, and its hand the last link turned by 180
+degrees about its own axis, at the flange.
 """
 
 from __future__ import annotations
@@ -109,31 +112,51 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
             return s, -c
 
 
-def from_oat(x: float, y: float, z: float, o: float, a: float, t: float) -> Transformation:
-    """The transformation of X, Y, Z [mm] and O, A, T [deg]."""
-    (c1, s1), (c2, s2), (c3, s3) = _cos_sin(o - 90.0), _cos_sin(a + 90.0), _cos_sin(t)
-    return Transformation(
-        [
-            [c1 * c2 * c3 - s1 * s3, -c1 * c2 * s3 - s1 * c3, c1 * s2, x],
-            [s1 * c2 * c3 + c1 * s3, -s1 * c2 * s3 + c1 * c3, s1 * s2, y],
-            [-s2 * c3, s2 * s3, c2, z],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a dialect writes the turn of a transformation: as Rz Ry Rz by three angles, less its offsets."""
+
+    name: str
+    angles: tuple[str, str, str]
+    """What its angles are called."""
+    offsets: tuple[float, float, float]
+    """Its angles of no turn [deg]."""
+
+    def transformation(self, x: float, y: float, z: float, o: float, a: float, t: float) -> Transformation:
+        """The transformation of X, Y, Z [mm] and the dialect's three angles [deg]."""
+        first, second, third = self.offsets
+        (c1, s1), (c2, s2), (c3, s3) = _cos_sin(o - first), _cos_sin(a - second), _cos_sin(t - third)
+        return Transformation(
+            [
+                [c1 * c2 * c3 - s1 * s3, -c1 * c2 * s3 - s1 * c3, c1 * s2, x],
+                [s1 * c2 * c3 + c1 * s3, -s1 * c2 * s3 + c1 * c3, s1 * s2, y],
+                [-s2 * c3, s2 * s3, c2, z],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
+
+    def numbers(self, location: Location) -> tuple[float, ...]:
+        """The six numbers of a location: joints [deg], or X, Y, Z [mm] and the dialect's angles [deg].
+
+        The first and the third angle are in (-180, 180], the second turns by 0 to 180. Where it turns by either of
+        these, the others can't be told apart: the first is that of no turn.
+        """
+        if isinstance(location, PrecisionPoint):
+            return location.joints
+        R, (x, y, z) = location.X[:3, :3], location.X[:3, 3].tolist()
+        level = math.hypot(R[0, 2], R[1, 2])
+        if level < _VERTICAL:
+            turns = 0.0, 0.0 if R[2, 2] > 0 else 180.0, math.degrees(math.atan2(R[1, 0], R[1, 1]))
+        else:
+            o, a = math.atan2(R[1, 2], R[0, 2]), math.atan2(level, R[2, 2])
+            turns = math.degrees(o), math.degrees(a), math.degrees(math.atan2(R[2, 1], -R[2, 0]))
+        first, second, third = self.offsets
+        return x, y, z, _wrapped(turns[0] + first), turns[1] + second, _wrapped(turns[2] + third)
 
 
-def to_oat(transformation: Transformation) -> tuple[float, float, float, float, float, float]:
-    """X, Y, Z [mm] and O, A, T [deg] in (-180, 180], A in [-90, 90]; O is 90 where A is ±90."""
-    R, (x, y, z) = transformation.X[:3, :3], transformation.X[:3, 3].tolist()
-    level = math.hypot(R[0, 2], R[1, 2])
-    if level < _VERTICAL:
-        up = R[2, 2] > 0
-        t = math.atan2(R[1, 0], R[1, 1])
-        return x, y, z, 90.0, -90.0 if up else 90.0, _wrapped(math.degrees(t))
-    o = math.atan2(R[1, 2], R[0, 2])
-    a = math.atan2(level, R[2, 2])
-    t = math.atan2(R[2, 1], -R[2, 0])
-    return x, y, z, _wrapped(math.degrees(o) + 90.0), math.degrees(a) - 90.0, _wrapped(math.degrees(t))
+VAL2: Final = Dialect("VAL-II", ("O", "A", "T"), (90.0, -90.0, 0.0))
+VPLUS: Final = Dialect("V+", ("y", "p", "r"), (0.0, 0.0, 0.0))
+"""Yaw, pitch and roll."""
 
 
 def _wrapped(degrees: float) -> float:

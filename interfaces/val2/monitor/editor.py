@@ -168,7 +168,11 @@ def edit(state: TerminalState, rest: str) -> Dialogue:
     name, programs = head.name, state.controller.memory.programs
     state.refuse_in_use(name)
     known = programs.get(name)
-    program = head if known is None else replace(known, parameters=head.parameters or known.parameters)
+    program = (
+        replace(head, dialect=state.controller.dialect)
+        if known is None
+        else replace(known, parameters=head.parameters or known.parameters)
+    )
     state.last_edit = name
     taught: Variable | None = None
 

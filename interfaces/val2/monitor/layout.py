@@ -6,13 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from interfaces.val2.motion.places import Where
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, to_oat
+from interfaces.val2.values import VAL2, Dialect, Location, Transformation, Value
 
 WIDTH = 79
 """Longest line [characters]."""
 _COLUMN = 9
-HEADINGS = ("X/JT1", "Y/JT2", "Z/JT3", "O/JT4", "A/JT5", "T/JT6")
-"""Of a location's six numbers."""
 
 
 def fixed(value: float, decimals: int) -> str:
@@ -34,31 +32,31 @@ def variable(named: Variable) -> str:
     return f"{named.name}[{','.join(indices)}]" if indices else named.name
 
 
-def six(location: Location) -> tuple[float, ...]:
-    """X, Y, Z [mm], O, A, T [deg] of a transformation; the joint values [deg] of a precision point."""
-    return location.joints if isinstance(location, PrecisionPoint) else to_oat(location)
-
-
-def heading() -> str:
+def heading(dialect: Dialect = VAL2) -> str:
     """The line above those of `row`."""
-    return "".join(f"{text:>{_COLUMN}}" for text in HEADINGS)
+    return "".join(f"{f'{axis}/JT{n}':>{_COLUMN}}" for n, axis in enumerate(("X", "Y", "Z", *dialect.angles), 1))
 
 
-def row(location: Location) -> str:
+def row(location: Location, dialect: Dialect = VAL2) -> str:
     """A location's six numbers in columns."""
     lengths = isinstance(location, Transformation)
     return "".join(
-        f"{fixed(value, 2 if lengths and index < 3 else 3):>{_COLUMN}}" for index, value in enumerate(six(location))
+        f"{fixed(value, 2 if lengths and index < 3 else 3):>{_COLUMN}}"
+        for index, value in enumerate(dialect.numbers(location))
     )
 
 
-def where(place: Where) -> list[str]:
+def where(place: Where, dialect: Dialect = VAL2) -> list[str]:
     """WHERE: the tool, then the joints and the hand."""
     joints = row(place.joints)
-    return [f"{heading()}{'HAND':>{_COLUMN}}", row(place.tool), f"{joints}{fixed(place.hand, 2):>{_COLUMN}}"]
+    return [
+        f"{heading(dialect)}{'HAND':>{_COLUMN}}",
+        row(place.tool, dialect),
+        f"{joints}{fixed(place.hand, 2):>{_COLUMN}}",
+    ]
 
 
-def values(known: Mapping[str, Value]) -> list[str]:
+def values(known: Mapping[str, Value], dialect: Dialect = VAL2) -> list[str]:
     """LISTL, LISTR, LISTS: a line each; a location's long name has one of its own."""
     width, lines = max(map(len, known), default=0), []
     for name, value in known.items():
@@ -67,8 +65,9 @@ def values(known: Mapping[str, Value]) -> list[str]:
         elif isinstance(value, str):
             lines.append(f'{name:{width}} = "{visible(value)}"')
         else:
-            lines += [] if lines else [f"{'':15}{heading()}"]
-            lines += [f"{name:15}{row(value)}"] if len(name) <= 15 else [name, f"{'':15}{row(value)}"]
+            shown = row(value, dialect)
+            lines += [] if lines else [f"{'':15}{heading(dialect)}"]
+            lines += [f"{name:15}{shown}"] if len(name) <= 15 else [name, f"{'':15}{shown}"]
     return lines
 
 

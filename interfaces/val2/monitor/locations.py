@@ -19,7 +19,7 @@ from interfaces.val2.monitor.state import (
     pieces,
 )
 from interfaces.val2.syntax import Compound, Number, Variable
-from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation, from_oat
+from interfaces.val2.values import NULL, Dialect, Location, PrecisionPoint, Transformation
 
 REPEAT_PERIOD: Final = 0.5
 """Time between two lines of `WHERE 1` [s]."""
@@ -27,7 +27,8 @@ REPEAT_PERIOD: Final = 0.5
 
 def _change(state: TerminalState, variable: Variable, value: Location) -> Dialogue:
     """Show a location's six numbers and ask for changes to them, such as `,,10`, until there are none."""
-    state.say(layout.heading(), layout.row(value))
+    dialect = state.controller.dialect
+    state.say(layout.heading(dialect), layout.row(value, dialect))
     while True:
         try:
             text = (yield Question("Change? ")) or ""
@@ -37,20 +38,21 @@ def _change(state: TerminalState, variable: Variable, value: Location) -> Dialog
             if not text.strip():
                 state.controller.memory.set(variable, value)
                 return
-            value = _changed(value, text)
-            state.say(layout.row(value))
+            value = _changed(value, text, dialect)
+            state.say(layout.row(value, dialect))
 
 
-def _changed(value: Location, text: str) -> Location:
+def _changed(value: Location, text: str, dialect: Dialect) -> Location:
     """A location with some of its six numbers replaced, by numbers and nothings between commas."""
     given = pieces(text)
     if len(given) > 6:
         raise ValError("Invalid argument", f"{text.strip()}: at most six numbers between commas")
-    numbers = list(layout.six(value))
+    numbers = list(dialect.numbers(value))
     for index, piece in enumerate(given):
         if piece:
             numbers[index] = _number(piece)
-    return PrecisionPoint(tuple(numbers)) if isinstance(value, PrecisionPoint) else from_oat(*numbers)
+    joints = isinstance(value, PrecisionPoint)
+    return PrecisionPoint(tuple(numbers)) if joints else dialect.transformation(*numbers)
 
 
 def _number(text: str) -> float:
@@ -72,20 +74,20 @@ def where(state: TerminalState, rest: str) -> Dialogue:
         real = arm.real(now=state.now)
         if real is None:
             raise ValError("No other twin", "nothing has been heard of a real arm")
-        state.say(*layout.where(real))
+        state.say(*layout.where(real, state.controller.dialect))
     else:
         nothing(rest, "WHERE but 1 or REAL")
-        state.say(*layout.where(arm.here(now=state.now)))
+        state.say(*layout.where(arm.here(now=state.now), state.controller.dialect))
 
 
 def _watch(state: TerminalState) -> Dialogue:
     arm, due = state.controller.arm, state.now
-    heading, *_ = layout.where(arm.here(now=due))
+    heading, *_ = layout.where(arm.here(now=due), state.controller.dialect)
     shown: list[str] = []
     state.say(heading)
     while (yield Question(due=due)) is None:
         due = state.now + REPEAT_PERIOD
-        _, *rows = layout.where(arm.here(now=state.now))
+        _, *rows = layout.where(arm.here(now=state.now), state.controller.dialect)
         if rows != shown:
             shown = rows
             state.say(*rows)
@@ -99,7 +101,7 @@ def rewind(state: TerminalState, rest: str) -> None:
     apart = (
         f"{layout.fixed(now - t, 3)} s ago" if t <= now else f"{layout.fixed(t - now, 3)} s from now, as planned"
     )
-    state.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past))
+    state.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past, state.controller.dialect))
 
 
 def here(state: TerminalState, rest: str) -> Dialogue:
@@ -155,7 +157,7 @@ def teach(state: TerminalState, rest: str) -> Dialogue:
         with state.guarded():
             value = state.here(variable)
             state.controller.memory.set(variable, value)
-            state.say(layout.row(value))
+            state.say(layout.row(value, state.controller.dialect))
             variable = following(variable)
 
 
@@ -174,6 +176,7 @@ def frame(state: TerminalState, rest: str, *, word: str) -> None:
     """TOOL, TOOL transformation; BASE, BASE dx,dy,dz,turn."""
     arm = state.controller.arm
     if rest in {"", "?"}:
-        state.say(layout.heading(), layout.row(arm.tool() if word == "TOOL" else arm.base()))
+        shown, dialect = arm.tool() if word == "TOOL" else arm.base(), state.controller.dialect
+        state.say(layout.heading(dialect), layout.row(shown, dialect))
     else:
         state.controller.do(state.instruction(word, rest), now=state.now)

@@ -52,7 +52,7 @@ def list_values(state: TerminalState, rest: str, *, kind: str) -> None:
             raise ValError("Invalid argument", f"{rest}: a string is wanted")
         state.say(f'"{layout.visible(value)}"')
     else:
-        state.say_all(layout.values(chosen(known, rest, _WORDS[kind])), f"No {kind}")
+        state.say_all(layout.values(chosen(known, rest, _WORDS[kind]), state.controller.dialect), f"No {kind}")
 
 
 def _product(rest: str, known: Iterable[str]) -> bool:
@@ -146,7 +146,7 @@ def load(state: TerminalState, rest: str) -> None:
 
 def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None, None]:
     """Read a file and take what it holds, in slices."""
-    source = yield from read_file(text, name)
+    source = yield from read_file(text, name, dialect=state.controller.dialect)
     entries = source.values
     if len(entries) > MOST_MEANWHILE and state.controller.running:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
@@ -219,7 +219,8 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
         elif names:
             entries = {shown: entry for shown, entry in entries.items() if entry.variable.name in used}
         values[kind] = tuple(entries.values())
-    return SourceFile(name, tuple(programs.values()), **values, signals=() if parts else state.controller.cell)
+    signals, dialect = () if parts else state.controller.cell, state.controller.dialect
+    return SourceFile(name, tuple(programs.values()), **values, signals=signals, dialect=dialect)
 
 
 def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:

@@ -6,11 +6,12 @@ import numpy as np
 
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.motion.places import Frames
-from interfaces.val2.values import from_oat
+from interfaces.val2.values import VAL2
 from robots import puma560
 from vrs import Engine, ManualClock
 
 MODEL = puma560.model()
+from_oat, to_oat = VAL2.transformation, VAL2.numbers
 DOWN = (90.0, 90.0, 0.0)
 SQUARE = [from_oat(x, y, 0, *DOWN) for x, y in ((-100, 500), (100, 500), (100, 600), (-100, 600))]
 

@@ -12,12 +12,12 @@ from interfaces.val2.motion.remote import RemoteRobot
 from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from interfaces.val2.values import Transformation, about_x, about_z, from_oat, to_oat
+from interfaces.val2.values import Transformation, about_x, about_z
 from robots import load
 from robots.robot import exact_arm
 from tests.interfaces.joined import MODEL, bad, constant
 
-from .bench import SQUARE, Bench, close
+from .bench import SQUARE, Bench, close, from_oat, to_oat
 from .sitting import Sitting, numbers
 from .test_remote import Line
 

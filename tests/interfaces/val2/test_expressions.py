@@ -14,7 +14,8 @@ from interfaces.val2.formats import general, number
 from interfaces.val2.memory import MOST_VALUES, Memory
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.syntax import Format, Number, Variable
-from interfaces.val2.values import NULL, PrecisionPoint, Transformation, from_oat, to_oat
+from interfaces.val2.values import NULL, PrecisionPoint, Transformation
+from tests.interfaces.val2.bench import from_oat, to_oat
 from tests.interfaces.val2.rig import Rig, body, run
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation, from_oat, to_oat
+from interfaces.val2.values import PrecisionPoint, Transformation
+from tests.interfaces.val2.bench import from_oat, to_oat
 
 from .sitting import AWAY, LOOP, numbers
 

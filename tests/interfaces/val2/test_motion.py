@@ -10,9 +10,9 @@ import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion.places import NEST, READY, Frames, aligned, with_word
-from interfaces.val2.values import NULL, PrecisionPoint, from_oat, to_oat, to_val_joints
+from interfaces.val2.values import NULL, PrecisionPoint, to_val_joints
 from robots import puma560
-from tests.interfaces.val2.bench import DOWN, MODEL, SQUARE, Bench, close
+from tests.interfaces.val2.bench import DOWN, MODEL, SQUARE, Bench, close, from_oat, to_oat
 from vrs import Status
 
 

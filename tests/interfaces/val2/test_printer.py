@@ -45,7 +45,7 @@ def test_a_printed_program_reads_the_same(program):
 def test_programs_as_people_write_them_read_the_same(path):
     text = path.read_bytes().decode()
     for program in parse_file(text, path.name).programs:
-        assert parse_program(print_program(program)) == program
+        assert parse_program(print_program(program), program.dialect) == program
 
 
 @pytest.mark.parametrize(

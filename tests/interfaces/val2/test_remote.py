@@ -18,9 +18,9 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, arm_for
 from interfaces.val2.motion.places import READY
 from interfaces.val2.motion.remote import RemoteRobot
-from interfaces.val2.values import from_oat, to_oat
 from tests.interfaces.joined import MODEL, Joined, bad, constant
 from tests.interfaces.live_rig import operator_here, robot_here
+from tests.interfaces.val2.bench import from_oat, to_oat
 from vrs.commands import Stop
 
 NEAR = from_oat(-100, 550, 0, 90, 90, 0)

@@ -23,7 +23,8 @@ from interfaces.val2.source import (
     print_rule,
 )
 from interfaces.val2.syntax import Number, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation, from_oat
+from interfaces.val2.values import NULL, VAL2, PrecisionPoint
+from tests.interfaces.val2.bench import from_oat
 
 PROGRAMS = sorted((Path(__file__).parent / "programs").glob("*.v2"))
 WHOLE = """; a tray
@@ -135,8 +136,9 @@ def test_files_of_v_plus_have_other_comments_and_step_numbers():
 
 
 def test_upright_poses_are_printed_with_o_90():
-    assert numbers_of(Transformation(np.eye(4))) == (0, 0, 0, 90, -90, 0)
-    assert numbers_of(from_oat(1, 2, 3, 30, 90, 0))[3:5] == (90, 90)
+    upright, down = (NamedValue(Variable("p"), value) for value in (NULL, from_oat(1, 2, 3, 30, 90, 0)))
+    assert numbers_of(upright, VAL2) == (0, 0, 0, 90, -90, 0)
+    assert numbers_of(down, VAL2)[3:5] == (90, 90)
 
 
 def test_a_text_without_a_header_is_a_program_of_the_files_name():
