@@ -61,7 +61,6 @@ from vrs.insertion import (
     piece,
     removed,
     room,
-    shifted,
     span,
     stay,
 )
@@ -74,7 +73,7 @@ from vrs.planning import Plan, altering, rounding, steering
 from vrs.planning.certificate import violation
 from vrs.planning.jerk_limited import is_prompt_stop, stop, straight_stop
 from vrs.planning.plan import end_position, end_state
-from vrs.segment import HOLD, Piece, State
+from vrs.segment import HOLD, Piece, State, shifted
 from vrs.timeline import BaseTimeline, Timeline
 
 TimelineT = TypeVar("TimelineT", bound=BaseTimeline[Any])

@@ -291,7 +291,9 @@ _STRANGE: Final = {
 """What second angles a dialect prints, and from where on, on which side, one looks like the other dialect's."""
 
 
-_VPLUS_ALONE: Final = frozenset(["ATTACH", "AUTO", "DETACH", "EXECUTE", "FCLOSE", "GLOBAL", "LOCAL", "READ", "SELECT", "WRITE"])
+_VPLUS_ALONE: Final = frozenset(
+    ["ATTACH", "AUTO", "DETACH", "EXECUTE", "FCLOSE", "GLOBAL", "LOCAL", "READ", "SELECT", "WRITE"]
+)
 """Instructions that no program of VAL-II's has."""
 
 
