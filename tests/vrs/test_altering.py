@@ -438,9 +438,9 @@ def test_one_period_is_planned_well_within_it():
     took = []
     for k in range(60):
         alone.clock.set(0.2 + k * PERIOD)
-        begun = time.perf_counter()
+        begun = time.thread_time()
         alone.engine.execute(Alter(offset(k * PERIOD)))
-        took.append(time.perf_counter() - begun)
+        took.append(time.thread_time() - begun)
     # Generous: the machine is shared. `benchmarks/altering.py` says what it takes.
     assert np.median(took) < 0.25 * PERIOD
 
