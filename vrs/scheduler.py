@@ -369,7 +369,7 @@ class Scheduler(BaseScheduler[Timeline]):
         before = self.ledger.command(passed_by)
         smooth = command.profile is not Profile.JERK_LIMITED or self.smooth(passed_by)
         passer = Passer(
-            self.model, self.limits, self.timeline, self.planner, command, gap, t, (passed_by, before, smooth), now
+            self.model, self.limits, self.timeline, self.planner, command, gap, t, passed_by, before, smooth, now
         )
         if command.deviation == inf:
             start, plan, notes = passer.continuous(first, second, begin, notes)

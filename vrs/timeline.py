@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, NonFiniteTimeError
-from vrs.evaluation import Places, places_of, sample_many
+from vrs.evaluation import DENSE, GATHERED, Places, horner, nodes_at, places_of, stack_of
 from vrs.model import Array
 from vrs.segment import (
     HOLD,
@@ -361,8 +361,48 @@ class Timeline(BaseTimeline[PolynomialSegment]):
             return self._at(float(moments), order)
         if self._root is None:
             return np.tile(np.zeros(self.dof) if order else self._initial, (len(moments), 1))
-        span, held = (self._first, self._end), (self._initial, self._last())
-        return sample_many(self._root, len(self._levels), span, held, self._find, moments, order)
+        places = None if (moments[1:] >= moments[:-1]).all() else np.argsort(moments)
+        if places is not None:
+            moments = moments[places]
+        values = np.empty((len(moments), self.dof))
+        begin, stop = moments.searchsorted((self._first, self._end)).tolist()
+        values[:begin] = 0.0 if order else self._initial
+        values[stop:] = 0.0 if order else self._last()
+        if begin < stop:
+            self._fill(moments[begin:stop], order, values[begin:stop])
+        if places is None:
+            return values
+        result = np.empty_like(values)
+        result[places] = values
+        return result
+
+    def _fill(self, t: Array, derivative: int, out: Array) -> None:
+        """Write the values at sorted times within the span into `out`, (k, n), by Horner's rule."""
+        assert self._root is not None
+        count, n = out.shape
+        room = min(count, GATHERED)
+        terms, u = np.empty((room, n, QUICK_ORDER)), np.empty(room)
+        begin = end = 0
+
+        def finish() -> None:
+            powers = terms[: end - begin].reshape(-1, QUICK_ORDER).T
+            horner(powers.__getitem__, QUICK_ORDER, u[: end - begin], derivative, out[begin:end])
+
+        for node, offset, low, high in nodes_at(self._root, len(self._levels), 0.0, t, 0):
+            stack = stack_of(node, n, high - low)
+            if stack is None:
+                for row, x in zip(out[low:high], t[low:high].tolist(), strict=True):
+                    start, _, coefficients = self._find(x)
+                    row[:] = evaluate(coefficients, x - start, derivative)
+            elif stack.quick and high - low < DENSE:
+                if low != end or high - begin > room:
+                    finish()
+                    begin = low
+                end = high
+                stack.gather(t[low:high], offset, terms[low - begin : high - begin], u[low - begin : high - begin])
+            else:
+                stack.fill(t[low:high], offset, derivative, out[low:high])
+        finish()
 
     def _at(self, t: float, order: int) -> Array:
         if not order:
