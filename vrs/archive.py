@@ -17,7 +17,7 @@ from math import inf
 from typing import Any
 
 from vrs.timeline import Timeline
-from vrs.tree import Leaf, Newest, Node
+from vrs.tree import CacheLimit, Leaf, Node
 
 KEPT = 100_000
 """Newest segments of a timeline, which stay in memory: 27 MB of cubic ones of six joints."""
@@ -112,7 +112,7 @@ class _Place:
         """A node's `head`."""
         self.live: Any = None
 
-    def fetched(self, live: Leaf | Node, read: Newest[_Place]) -> None:
+    def fetched(self, live: Leaf | Node, read: CacheLimit[_Place]) -> None:
         """Keep in memory what was read, until there's too much of it."""
         self.live = live
         read.add(self)
@@ -122,7 +122,7 @@ class _Place:
         self.live = None
 
 
-READ_LEAVES, READ_NODES = Newest(256, _Place.forget), Newest(32, _Place.forget)
+READ_LEAVES, READ_NODES = CacheLimit(256, _Place.forget), CacheLimit(32, _Place.forget)
 """Leaves and nodes that are in memory again in all: 2.4 and 0.7 MB."""
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vrs.model import Array
 from vrs.segment import QUICK_ORDER, filled_rows
-from vrs.tree import Newest, Node, first_start
+from vrs.tree import CacheLimit, Node, first_start
 
 DENSE = 1024
 """Times below one node of height 1 that are worth more than the shortest way."""
@@ -141,7 +141,7 @@ class Index:
         self.columns, self.missed = None, -1000
 
 
-INDEXES = Newest(512, Index.forget)
+INDEXES = CacheLimit(512, Index.forget)
 """Indexes that are kept in all: 0.3 GB of cubic segments of six joints."""
 
 
@@ -227,7 +227,7 @@ def _unstack(node: Node) -> None:
     node.stack = None
 
 
-STACKS = Newest(128, _unstack)
+STACKS = CacheLimit(128, _unstack)
 """Stacks that are kept in all: 0.1 GB of cubic segments of six joints."""
 
 

@@ -97,7 +97,7 @@ class Node:
         """For how many times the stack was missing."""
 
 
-class Newest(Generic[_T]):
+class CacheLimit(Generic[_T]):
     """The newest so many things of a kind whose caches are in memory; of older ones they're dropped."""
 
     def __init__(self, most: int, drop: Callable[[_T], None]) -> None:
