@@ -780,7 +780,7 @@ class Scheduler(BaseScheduler[Timeline]):
         old, index = paused.timeline, paused.timeline.index_at(paused.at)
         number = self.ledger.newest + 1
         owner = old.owner_of(index) if 0 <= index < len(old) else HOLD
-        interrupted = self.ledger.before(owner, paused.version)
+        interrupted = self.ledger.receipt(owner, before=paused.version) if owner in self.ledger else None
         motion = self.ledger.command(owner)
         segments = None
         if interrupted is not None and interrupted.execute_at is not None:

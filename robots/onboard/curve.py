@@ -136,12 +136,8 @@ def _evaluated(pieces: Array, u: Array) -> tuple[Array, Array, Array]:
 
 def _speeds(pieces: Array, u: Array) -> Array:
     """|dp/du| at u (k, m) of pieces (k, degree + 1, 2), (k, m)."""
-    pieces = pieces.reshape(len(u), -1, 2)
-    k = np.arange(1, pieces.shape[1], dtype=np.float64)
-    powers = u[..., None] ** (k - 1)
-    velocity = np.einsum("kmj,kjd->kmd", powers, pieces[:, 1:] * k[:, None])
-    speed: Array = np.hypot(velocity[..., 0], velocity[..., 1])
-    return speed
+    velocity = _evaluated(np.repeat(pieces, u.shape[1], axis=0), u.ravel())[1]
+    return np.asarray(np.hypot(*velocity.T).reshape(u.shape))
 
 
 def _derivatives(rows: list[list[float]], u: float) -> tuple[tuple[float, float], ...]:
