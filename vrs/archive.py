@@ -10,16 +10,14 @@ from __future__ import annotations
 import errno
 import os
 import threading
-import weakref
 from array import array
 from bisect import bisect_right
-from collections import deque
 from itertools import accumulate, pairwise
 from math import inf
 from typing import Any
 
 from vrs.timeline import Timeline
-from vrs.tree import Leaf, Node
+from vrs.tree import CacheLimit, Leaf, Node
 
 KEPT = 100_000
 """Newest segments of a timeline, which stay in memory: 27 MB of cubic ones of six joints."""
@@ -42,14 +40,8 @@ RESERVE = 2**30
 GRANT = 2**20
 """How much is written between looks at the space that's left [B]."""
 
-READ_LEAVES, READ_NODES = 256, 32
-"""Leaves and nodes that are in memory again in all, the oldest dropped first: 2.4 and 0.7 MB."""
-
 _exchange = threading.Lock()
 """Held while something takes another class: branches share leaves."""
-
-_read_leaves: deque[weakref.ref[_Place]] = deque()
-_read_nodes: deque[weakref.ref[_Place]] = deque()
 
 
 class _File:
@@ -120,14 +112,18 @@ class _Place:
         """A node's `head`."""
         self.live: Any = None
 
-    def fetched(self, live: Leaf | Node, read: deque[weakref.ref[_Place]], most: int) -> None:
-        """Keep in memory what was read, and not more than so many."""
+    def fetched(self, live: Leaf | Node, read: CacheLimit[_Place]) -> None:
+        """Keep in memory what was read, until there's too much of it."""
         self.live = live
-        read.append(weakref.ref(self))
-        while len(read) > most:
-            oldest = read.popleft()()
-            if oldest is not None:
-                oldest.live = None
+        read.add(self)
+
+    def forget(self) -> None:
+        """Drop what was read."""
+        self.live = None
+
+
+READ_LEAVES, READ_NODES = CacheLimit(256, _Place.forget), CacheLimit(32, _Place.forget)
+"""Leaves and nodes that are in memory again in all: 2.4 and 0.7 MB."""
 
 
 class StoredLeaf(Leaf):
@@ -140,7 +136,7 @@ class StoredLeaf(Leaf):
         live = place.live
         if live is None:
             live = _leaf(place.file.read(place.position, place.size), self.count)
-            place.fetched(live, _read_leaves, READ_LEAVES)
+            place.fetched(live, READ_LEAVES)
         return getattr(live, name)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -163,7 +159,7 @@ class StoredNode(Node):
         live = place.live
         if live is None:
             live = _node(place.file, place.file.read(place.position, place.size))
-            place.fetched(live, _read_nodes, READ_NODES)
+            place.fetched(live, READ_NODES)
         return getattr(live, name)
 
     def __reduce__(self) -> tuple[Any, ...]:

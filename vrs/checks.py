@@ -205,9 +205,9 @@ def validated(cls: _ClassT) -> _ClassT:
     """Check the fields of a dataclass by their annotations when one is made; stands below `@dataclass`.
 
     A field with a range (`within`, `positive`, `at_least`) is a number in it, kept as a float, or an integer where
-    the annotation says so; one with a least and a most length has as many elements; a `bool` is True or False; an
-    enumeration's member may be named by its text; None passes where the annotation admits it. The class's own
-    `__post_init__` follows. What is not allowed raises InvalidValueError.
+    the annotation says so; one with a least and a most length has as many elements; a `bool` is True or False; None
+    passes where the annotation admits it. The class's own `__post_init__` follows; after it texts become members of
+    the enumeration that a field is of. What is not allowed raises InvalidValueError.
 
     Args:
         cls: The class, its fields annotated.
@@ -220,6 +220,8 @@ def validated(cls: _ClassT) -> _ClassT:
             object.__setattr__(self, name, convert(getattr(self, name)))
         if own is not None:
             own(self)
+        for name, words in _enumerations(kind):
+            object.__setattr__(self, name, word(name, getattr(self, name), words))
 
     setattr(cls, "__post_init__", check)  # noqa: B010 (mypy knows of no such attribute)
     return cls
@@ -251,14 +253,20 @@ def _converters(cls: Any) -> _Converters:
     return tuple((name, found) for name in names if (found := _converter(name, hints[name])))
 
 
+@functools.cache
+def _enumerations(cls: Any) -> tuple[tuple[str, type[StrEnum]], ...]:
+    """Return the enumeration of each field of a dataclass that is of one."""
+    hints = get_type_hints(cls)
+    kinds = ((item.name, hints[item.name]) for item in fields(cls))
+    return tuple((name, kind) for name, kind in kinds if isinstance(kind, type) and issubclass(kind, StrEnum))
+
+
 def _converter(name: str, hint: object) -> Callable[[object], object] | None:
     """Return what checks a field of this annotation; None where it allows all."""
     kinds = [kind for kind in get_args(hint) if kind is not NoneType] if NoneType in get_args(hint) else [hint]
     optional = kinds != [hint]
     if kinds == [bool]:
         return functools.partial(_boolean, name)
-    if isinstance(hint, type) and issubclass(hint, StrEnum):
-        return functools.partial(word, name, kind=hint)
     if len(kinds) != 1 or get_origin(kinds[0]) is not Annotated:
         return None
     base, *notes = get_args(kinds[0])

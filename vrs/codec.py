@@ -123,13 +123,14 @@ def from_msgpack(data: bytes, kind: type[_KindT] = Timeline) -> _KindT:  # type:
     return _read(data, msgspec.msgpack.decode, kind)
 
 
-def _read(data: bytes, decode: Callable[..., Any], kind: Any) -> Any:
+def _read(data: bytes, decode: Callable[..., Any], kind: type[_KindT]) -> _KindT:
+    make: Callable[..., _KindT] = kind
     schema, form = _FORMS[kind]
     try:
         wire = decode(data, type=form)
         if (wire.schema, wire.schema_version) != (schema, SCHEMA_VERSION):
             found = f"{wire.schema} {wire.schema_version}"
             raise FormatError("timeline", f"must be of schema {schema} {SCHEMA_VERSION}, not {found}")
-        return kind(wire.initial, wire.start, [segment_from_wire(one) for one in wire.segments], wire.version)
+        return make(wire.initial, wire.start, [segment_from_wire(one) for one in wire.segments], wire.version)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError, InvalidValueError) as error:
         raise FormatError("timeline", str(error)) from None

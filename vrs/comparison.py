@@ -454,7 +454,8 @@ def compare_paths(
 
 def summed_up(match: PathMatch) -> PathComparison:
     """The figures of a match, of what was measured alone."""
-    mean, p95, largest = _spread(match.distance[np.isfinite(match.distance)])
+    distance = match.distance[np.isfinite(match.distance)]
+    mean, p95, largest = float(distance.mean()), float(np.quantile(distance, 0.95)), float(distance.max())
     cells, reached = len(match.s), len(match.t_follower)
     if cells < 3:
         return PathComparison(mean, p95, largest, None, None, None, None, None, None)
@@ -483,10 +484,6 @@ def _speed_error(t_leader: Array, t_follower: Array, window: int, cell: float) -
     spans = [span[known] for span in spans]
     speeds = [window * cell / span for span in spans]
     return float(np.mean(np.abs(speeds[1] - speeds[0])))
-
-
-def _spread(distance: Array) -> tuple[float, float, float]:
-    return float(distance.mean()), float(np.quantile(distance, 0.95)), float(distance.max())
 
 
 def _rms(values: Array) -> float:

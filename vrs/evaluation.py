@@ -6,7 +6,6 @@ import math
 import weakref
 from array import array
 from bisect import bisect_right
-from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias, TypeVar
 
@@ -14,14 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vrs.model import Array
-from vrs.segment import QUICK_ORDER, evaluate, filled_rows
-from vrs.tree import Node, first_start
-
-STACKS = 128
-"""Stacks that are kept in all, the oldest dropped first: 0.1 GB of cubic segments of six joints."""
-
-INDEXES = 512
-"""Indexes that are kept in all, the oldest dropped first: 0.3 GB of cubic segments of six joints."""
+from vrs.segment import QUICK_ORDER, filled_rows
+from vrs.tree import CacheLimit, Node, first_start
 
 DENSE = 1024
 """Times below one node of height 1 that are worth more than the shortest way."""
@@ -44,8 +37,6 @@ _Integers: TypeAlias = NDArray[np.int64]
 _VERSIONS = 2
 """Stacks, and indexes, that are kept of nodes that begin with the same leaf: most are of older timelines."""
 
-_stacked: deque[weakref.ref[Node]] = deque()
-_indexed: deque[weakref.ref[Index]] = deque()
 _stacked_from: dict[int, list[weakref.ref[Node]]] = {}
 _indexed_from: dict[int, list[weakref.ref[Index]]] = {}
 
@@ -142,13 +133,16 @@ class Index:
         older = _older(_indexed_from, node, self)
         if older is not None:
             older.columns, older.missed = None, 0
-        _indexed.append(weakref.ref(self))
-        while len(_indexed) > INDEXES:
-            oldest = _indexed.popleft()()
-            if oldest is not None:
-                # What doesn't fit in is made again seldom, so that making it doesn't cost more than it saves.
-                oldest.columns, oldest.missed = None, -1000
+        INDEXES.add(self)
         return columns
+
+    def forget(self) -> None:
+        """Drop the columns. What doesn't fit in is made again seldom: making it mustn't cost more than it saves."""
+        self.columns, self.missed = None, -1000
+
+
+INDEXES = CacheLimit(512, Index.forget)
+"""Indexes that are kept in all: 0.3 GB of cubic segments of six joints."""
 
 
 _Kept = TypeVar("_Kept")
@@ -159,7 +153,7 @@ def _older(kept: dict[int, list[weakref.ref[_Kept]]], node: Node, newest: _Kept)
 
     Leaves are told apart by their addresses: another leaf at the address of one that's gone costs but a cache.
     """
-    if len(kept) > 2 * (STACKS + INDEXES):
+    if len(kept) > 2 * (STACKS.most + INDEXES.most):
         kept.clear()
     first = id(node.children[0])
     older: list[_Kept] = []
@@ -225,89 +219,19 @@ def stack_of(node: Node, n: int, times: int) -> Stack | None:
         older = _older(_stacked_from, node, node)
         if older is not None:
             older.stack = None
-        _stacked.append(weakref.ref(node))
-        while len(_stacked) > STACKS:
-            oldest: Any = _stacked.popleft()()
-            if oldest is not None:
-                oldest.stack = None
+        STACKS.add(node)
     return stack
 
 
-def sample_many(
-    root: Node,
-    height: int,
-    span: tuple[float, float],
-    held: tuple[Array, Array],
-    find: Callable[[float], tuple[float, float, Array]],
-    t: Array,
-    derivative: int,
-) -> Array:
-    """Values at many times, by Horner's rule.
-
-    Args:
-        root: The tree.
-        height: Levels of nodes above its leaves.
-        span: Its start and its end [s].
-        held: Positions before it and after it, each (n,).
-        find: Gives a segment's start, the next one's, and the coefficients, for a time in the span.
-        t: Times [s], (k,), in any order.
-        derivative: Order of the time derivative.
-
-    Returns:
-        Values (k, n).
-    """
-    places = None if (t[1:] >= t[:-1]).all() else np.argsort(t)
-    if places is not None:
-        t = t[places]
-    values = np.empty((len(t), len(held[0])))
-    begin, stop = t.searchsorted(span).tolist()
-    values[:begin] = 0.0 if derivative else held[0]
-    values[stop:] = 0.0 if derivative else held[1]
-    if begin < stop:
-        _fill(root, height, find, t[begin:stop], derivative, values[begin:stop])
-    if places is None:
-        return values
-    result = np.empty_like(values)
-    result[places] = values
-    return result
+def _unstack(node: Node) -> None:
+    node.stack = None
 
 
-def _fill(
-    root: Node,
-    height: int,
-    find: Callable[[float], tuple[float, float, Array]],
-    t: Array,
-    derivative: int,
-    out: Array,
-) -> None:
-    """Write the values at sorted times that lie in a tree into `out`."""
-    count, n = out.shape
-    room = min(count, GATHERED)
-    terms, u = np.empty((room, n, QUICK_ORDER)), np.empty(room)
-    begin = end = 0
-
-    def finish() -> None:
-        powers = terms[: end - begin].reshape(-1, QUICK_ORDER).T
-        _horner(powers.__getitem__, QUICK_ORDER, u[: end - begin], derivative, out[begin:end])
-
-    for node, offset, low, high in _nodes_at(root, height, 0.0, t, 0):
-        stack = stack_of(node, n, high - low)
-        if stack is None:
-            for row, x in zip(out[low:high], t[low:high].tolist(), strict=True):
-                start, _, coefficients = find(x)
-                row[:] = evaluate(coefficients, x - start, derivative)
-        elif stack.quick and high - low < DENSE:
-            if low != end or high - begin > room:
-                finish()
-                begin = low
-            end = high
-            stack.gather(t[low:high], offset, terms[low - begin : high - begin], u[low - begin : high - begin])
-        else:
-            stack.fill(t[low:high], offset, derivative, out[low:high])
-    finish()
+STACKS = CacheLimit(128, _unstack)
+"""Stacks that are kept in all: 0.1 GB of cubic segments of six joints."""
 
 
-def _nodes_at(node: Any, height: int, offset: float, t: Array, done: int) -> Iterator[tuple[Node, float, int, int]]:
+def nodes_at(node: Any, height: int, offset: float, t: Array, done: int) -> Iterator[tuple[Node, float, int, int]]:
     """Nodes of height 1 in which sorted times lie, none before the first segment.
 
     Args:
@@ -335,7 +259,7 @@ def _nodes_at(node: Any, height: int, offset: float, t: Array, done: int) -> Ite
     while low < len(t):
         high = int(t.searchsorted(first(child + 1))) if child + 1 < len(node.children) else len(t)
         if low < high:
-            yield from _nodes_at(
+            yield from nodes_at(
                 node.children[child], height - 1, offset + node.offsets[child], t[low:high], done + low
             )
             low = high
@@ -368,10 +292,10 @@ def _fill_from(block: Array, index: _Integers, u: Array, derivative: int, out: A
     # Many times a segment: what few segments there are is put so that a power is read at once.
     powers = block[first : int(index[-1]) + 1].transpose(2, 0, 1).copy()
     near, room = index - first, np.empty_like(out)
-    _horner(lambda power: powers[power].take(near, 0, room, "clip").reshape(-1), len(powers), u, derivative, out)
+    horner(lambda power: powers[power].take(near, 0, room, "clip").reshape(-1), len(powers), u, derivative, out)
 
 
-def _horner(term: Callable[[int], Array], order: int, u: Array, derivative: int, out: Array) -> None:
+def horner(term: Callable[[int], Array], order: int, u: Array, derivative: int, out: Array) -> None:
     """Horner's rule, the operations of `evaluate` in their order.
 
     Args:

@@ -223,8 +223,8 @@ class Ledger(Generic[_TimelineT]):
     def __contains__(self, command_id: object) -> bool:
         return command_id in self.entries
 
-    def receipt(self, command_id: int) -> Receipt:
-        """The current truth of a command.
+    def receipt(self, command_id: int, *, before: float = inf) -> Receipt:
+        """The current truth of a command, or what it was before a version of the timeline.
 
         Raises:
             UnknownCommandError: If there's no receipt of that id.
@@ -234,7 +234,7 @@ class Ledger(Generic[_TimelineT]):
         except (KeyError, TypeError):
             raise UnknownCommandError(command_id, self.newest) from None
         for change in self.changes[bisect_left(self.versions, receipt.version + 1) :]:
-            if not receipt.stands:
+            if not receipt.stands or change.version >= before:
                 break
             receipt = _after(receipt, change)
         return receipt
@@ -267,16 +267,6 @@ class Ledger(Generic[_TimelineT]):
             if change.moved is not None:
                 start, end = change.moved(start), change.moved(end)
         return end <= t + ARRIVED
-
-    def before(self, command_id: int, version: int) -> Receipt | None:
-        """A receipt as it was before a version of the timeline; None where there's none."""
-        if command_id not in self.entries:
-            return None
-        receipt = self.entries[command_id].receipt
-        for change in self.changes:
-            if receipt.version < change.version < version and receipt.stands:
-                receipt = _after(receipt, change)
-        return receipt
 
     def command(self, command_id: int) -> MotionCommand | None:
         """The motion command of an id; None where it was something else or isn't known."""
@@ -471,13 +461,11 @@ class Ledger(Generic[_TimelineT]):
                 receipt, entry = self.receipt(command_id), self.entries[command_id]
                 now = replace(receipt, execute_at=start, end=end, version=change.version)
                 self._set(entry._replace(receipt=replace(now, superseded_by=None, undone=False)))
-        self._write_log(len(self.changes), (change,))
-        self.undo_steps.clear()
-        self.settled = (
+        self._settle(
+            change,
             f"the plan was put right at {change.at:.6g} s, since the real robot was going elsewhere: what was "
-            "commanded before can't be taken back"
+            "commanded before can't be taken back",
         )
-        del self.stills[bisect_left(self.stills, (change.at, 0)) :]
 
     def break_off(self, change: Change, notes: Notes) -> Receipt:
         """Write down that the newest edit is taken back from `change.at` on, and all that was scheduled with it.
@@ -486,19 +474,24 @@ class Ledger(Generic[_TimelineT]):
             change: What that does to other commands.
             notes: What the user must know of it besides.
         """
-        undo = self.undo_steps.pop()
+        undo = self.undo_steps[-1]
         # What came before it can't be taken back any more: its timeline has another past.
-        self.undo_steps.clear()
-        self.settled = (
+        self._settle(
+            change,
             f"command {undo.command_id} was under way when it was taken back, at {change.at:.6g} s: what was "
-            "commanded before it can't be taken back"
+            "commanded before it can't be taken back",
         )
-        self._write_log(len(self.changes), (change,))
-        del self.stills[bisect_left(self.stills, (change.at, 0)) :]
         notes = (Note(NoteCode.UNDONE_FROM, (change.at,)), *notes)
         mine = replace(self.receipt(undo.command_id), reason=text_of(notes), version=change.version, undone=True)
         self._set(LedgerEntry(mine, self.command(undo.command_id), notes))
         return mine
+
+    def _settle(self, change: Change, why: str) -> None:
+        """Write a change down, behind which nothing can be taken back, and why."""
+        self._write_log(len(self.changes), (change,))
+        self.undo_steps.clear()
+        self.settled = why
+        del self.stills[bisect_left(self.stills, (change.at, 0)) :]
 
 
 def _after(receipt: Receipt, change: Change) -> Receipt:

@@ -8,7 +8,7 @@ Source: Doulgeri, Zikos, Delopoulos, sections II-A and II-B.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
 from typing import TypeAlias, TypeVar
@@ -213,42 +213,44 @@ _SAME = 1e-15
 """Times that differ by less, as a share of them or of a second, are one."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Passer:
     """One command that passes the end of another; times are those of its pace, as if at 1.
 
     What it makes is when the move begins [s], its plan, and what must be said of it.
     """
 
-    def __init__(
-        self,
-        model: RobotModel,
-        limits: Limits,
-        timeline: Timeline,
-        planner: Callable[[MotionCommand, Limits], MovePlanner],
-        command: MotionCommand,
-        gap: Gap,
-        t: float,
-        passed: tuple[int, MotionCommand | None, bool],
-        now: float | None,
-    ) -> None:
-        """Take what is scheduled, and who passes whom.
+    model: RobotModel
+    limits: Limits
+    """In force."""
+    timeline: Timeline
+    """As it is before the command."""
+    planner: Callable[[MotionCommand, Limits], MovePlanner]
+    """Plans moves of commands under limits."""
+    command: MotionCommand
+    """Its deviation above 0."""
+    gap: Gap
+    """What it's to fill if it stopped; the arm rests there."""
+    t: float
+    """Where it would begin if it stopped [s]."""
+    passed_by: int
+    """Id of the command before it."""
+    before: MotionCommand | None
+    """That command, if it's known."""
+    smooth: bool
+    """Whether that one moves smoothly, if it matters."""
+    now: float | None
+    """Present time [s]; None offline."""
 
-        Args:
-            model: The robot.
-            limits: In force.
-            timeline: As it is before the command.
-            planner: Plans moves of commands under limits.
-            command: The command, its deviation above 0.
-            gap: What it's to fill if it stopped; the arm rests there.
-            t: Where it would begin if it stopped [s].
-            passed: Id of the one before it; its command if that's known; whether it moves smoothly, if it matters.
-            now: Present time [s]; None offline.
-        """
-        self.model, self.limits, self.timeline, self.planner = model, limits, timeline, planner
-        self.command, self.gap, self.t, self.now = command, gap, t, now
-        self.passed_by, self.before, smooth = passed
-        self.jerky = command.profile is Profile.JERK_LIMITED
-        self.mixed: Notes = (Note(NoteCode.ROUNDED_WITH_PARABOLAS),) if self.jerky and not smooth else ()
+    @property
+    def jerky(self) -> bool:
+        """Whether jerk limits bind."""
+        return self.command.profile is Profile.JERK_LIMITED
+
+    @property
+    def mixed(self) -> Notes:
+        """What must be said where the move before isn't smooth."""
+        return (Note(NoteCode.ROUNDED_WITH_PARABOLAS),) if self.jerky and not self.smooth else ()
 
     def at_full_pace(self, plan: Plan) -> Plan:
         """A plan as it is where time runs 1/pace times as fast."""

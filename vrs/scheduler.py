@@ -397,7 +397,7 @@ class Scheduler(BaseScheduler[Timeline]):
         before = self.ledger.command(passed_by)
         smooth = command.profile is not Profile.JERK_LIMITED or self.smooth(passed_by)
         passer = Passer(
-            self.model, self.limits, self.timeline, self.planner, command, gap, t, (passed_by, before, smooth), now
+            self.model, self.limits, self.timeline, self.planner, command, gap, t, passed_by, before, smooth, now
         )
         if command.deviation == inf:
             start, plan, notes = passer.continuous(first, second, begin, notes)
@@ -931,7 +931,7 @@ class Scheduler(BaseScheduler[Timeline]):
         old, index = paused.timeline, paused.timeline.index_at(paused.at)
         number = self.ledger.newest + 1
         owner = old.owner_of(index) if 0 <= index < len(old) else HOLD
-        interrupted = self.ledger.before(owner, paused.version)
+        interrupted = self.ledger.receipt(owner, before=paused.version) if owner in self.ledger else None
         motion = self.ledger.command(owner)
         segments = None
         if interrupted is not None and interrupted.execute_at is not None:

@@ -9,15 +9,19 @@ out. Leaves that are made anew have absolute starts: their offset takes away wha
 
 from __future__ import annotations
 
+import weakref
 from array import array
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from vrs.model import Array
+
+_T = TypeVar("_T")
 
 LEAF = 48
 """Segments of a leaf, at most: more cost more to copy, fewer make more leaves."""
@@ -93,6 +97,23 @@ class Node:
         """For how many times the stack was missing."""
 
 
+class CacheLimit(Generic[_T]):
+    """The newest so many things of a kind whose caches are in memory; of older ones they're dropped."""
+
+    def __init__(self, most: int, drop: Callable[[_T], None]) -> None:
+        """Take how many, and what drops a cache."""
+        self.most, self._drop = most, drop
+        self._kept: deque[weakref.ref[_T]] = deque()
+
+    def add(self, kept: _T) -> None:
+        """Note that a cache was made."""
+        self._kept.append(weakref.ref(kept))
+        while len(self._kept) > self.most:
+            oldest = self._kept.popleft()()
+            if oldest is not None:
+                self._drop(oldest)
+
+
 class Run(NamedTuple):
     """Consecutive segments with absolute starts, in columns as a leaf's, of any length."""
 
@@ -115,47 +136,27 @@ Step: TypeAlias = tuple[Node, int, float]
 """A node on the way, the child that was taken, and the node's summed offset."""
 
 
-def index_at(root: Node, height: int, t: float) -> int:
-    """Index of the last segment that doesn't start after t, which isn't before the first."""
+def path_at(root: Node, height: int, t: float) -> tuple[int, Path]:
+    """Index of the last segment that doesn't start after t, which isn't before the first, and the way there."""
+    steps = []
     node: Any = root
     index, offset = 0, 0.0
     for _ in range(height):
         child = max(bisect_right(node.firsts, t - offset) - 1, 0)
+        steps.append((node, child, offset))
         index += node.counts[child]
         offset += node.offsets[child]
         node = node.children[child]
     starts = node.starts
     i = max(bisect_right(starts, t - offset) - 1, 0)
-    index += i
     # t − offset is rounded: the comparison that counts is the one with offset + start.
     if offset + starts[i] <= t and i + 1 < len(starts) and t < offset + starts[i + 1]:
-        return index
+        return index + i, Path(steps, node, i, offset)
+    index += i
     while index + 1 < root.count and start_of(root, height, index + 1) <= t:
         index += 1
     while start_of(root, height, index) > t:
         index -= 1
-    return index
-
-
-def path_at(root: Node, height: int, t: float) -> tuple[int, Path]:
-    """What `index_at` gives, and the way there."""
-    steps = []
-    node: Any = root
-    index, offset = 0, 0.0
-    for _ in range(height):
-        child = bisect_right(node.firsts, t - offset) - 1
-        if child < 0:
-            break
-        steps.append((node, child, offset))
-        index += node.counts[child]
-        offset += node.offsets[child]
-        node = node.children[child]
-    else:
-        starts = node.starts
-        i = bisect_right(starts, t - offset) - 1
-        if i >= 0 and offset + starts[i] <= t and i + 1 < len(starts) and t < offset + starts[i + 1]:
-            return index + i, Path(steps, node, i, offset)
-    index = index_at(root, height, t)
     return index, path_to(root, height, index)
 
 

@@ -137,7 +137,7 @@ class Reality:
     """Whether the joints feel the motors' rotors, G² J_m."""
     torque_limits: bool = True
     """Whether the drives' torques end at their limits."""
-    encoder_counts: int | None = 1000
+    encoder_counts: Annotated[int, within(1, 10_000_000)] | None = 1000
     """Encoder counts a motor turn, after quadrature, 1 to 10,000,000; None reads positions exactly."""
     gravity: Annotated[float, within(0.0, 100.0)] = 9.81
     """Acceleration of free fall [m/s²], along -z of the base, 0 to 100; the servo knows it."""
@@ -149,11 +149,6 @@ class Reality:
     def __post_init__(self) -> None:
         if not isinstance(self.friction, bool):
             object.__setattr__(self, "friction", number_in("friction", self.friction, 0.0, 10.0))
-        counts = self.encoder_counts
-        if counts is not None and (
-            isinstance(counts, bool) or not isinstance(counts, int) or not 1 <= counts <= 10_000_000
-        ):
-            raise InvalidValueError("encoder_counts", counts, "None or an integer in [1, 10000000]")
 
     @property
     def friction_scale(self) -> float:

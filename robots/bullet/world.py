@@ -56,7 +56,7 @@ def load_pybullet() -> Any:
     return pybullet
 
 
-class Client:
+class BulletClient:
     """PyBullet's functions and constants, each function of one world alone."""
 
     def __init__(self, number: int) -> None:
@@ -78,11 +78,11 @@ class World(Closing):
         """Connect a client with free fall along -z [m/s²] and a fixed step [s]."""
         bullet = load_pybullet()
         self._gravity, self._dt = gravity, dt
-        self._client: Client | None = Client(bullet.connect(bullet.DIRECT))
+        self._client: BulletClient | None = BulletClient(bullet.connect(bullet.DIRECT))
         self.clear()
 
     @property
-    def bullet(self) -> Client:
+    def bullet(self) -> BulletClient:
         """PyBullet, as of this world.
 
         Raises:

@@ -265,7 +265,7 @@ class MobileBody(MobileRobot):
         self._room_bodies = RoomBodies(self.world, self.room)
         self._cargo: list[int] = []
         train, dt = self._train, self.reality.dt
-        start = self._truth
+        start = self.truth
         self.body_id, self._centre, self._R_CR = load_chassis(
             self.world, self.chassis, self.reality, start, train.radii, train.base
         )
@@ -328,7 +328,7 @@ class MobileBody(MobileRobot):
             raise InvalidValueError("place", place, "one on the robot's top")
         at, R = self._pose()
         top = at + R @ np.array([x, y, chassis.height])
-        there = float(top[0]), float(top[1]), float(top[2]), self._truth[2]
+        there = float(top[0]), float(top[1]), float(top[2]), self.truth[2]
         self._cargo.append(put_cargo(self.world, cargo, self.body_id, self._room_bodies.floor, there))
 
     @property
@@ -339,11 +339,6 @@ class MobileBody(MobileRobot):
         found = (bullet.getBasePositionAndOrientation(one)[0] for one in self._cargo)
         places = (R.T @ (np.array(place) - at) for place in found)
         return tuple((float(x), float(y), float(z)) for x, y, z in places)
-
-    @property
-    def closed(self) -> bool:
-        """Whether the robot's world is closed."""
-        return self.world.closed
 
     @override
     def close(self) -> None:
@@ -392,8 +387,8 @@ class MobileBody(MobileRobot):
         if R[2, 2] < _UPRIGHT:
             raise LostError("robot", self.time, "fell over")
         heading = math.atan2(R[1, 0], R[0, 0])
-        turns = round((self._truth[2] - heading) / math.tau)
-        self._truth = float(x), float(y), heading + turns * math.tau
+        turns = round((self.truth[2] - heading) / math.tau)
+        self.truth = float(x), float(y), heading + turns * math.tau
         if self._steps % self._every_encoder:
             return
         states = self.world.bullet.getJointStates(self.body_id, DRIVES)
@@ -414,7 +409,7 @@ class MobileBody(MobileRobot):
         # What lies on top has no name in the room.
         touched = sorted({names[point[2]] for point in points if point[8] <= 0.0 and point[2] in names})
         # One that's touched on counts as the same collision.
-        self._touch(self._touches if self._touches in touched else touched[0] if touched else "")
+        self._touch(self.touching if self.touching in touched else touched[0] if touched else "")
 
     def _pose(self) -> tuple[Array, Array]:
         """Where the robot's frame is, (3,), and how it's turned, (3, 3)."""
@@ -451,7 +446,7 @@ class MobileBody(MobileRobot):
     def _put(self, posture: tuple[float, float, float]) -> None:
         # With it PyBullet takes the base's speed away.
         self._move(posture)
-        self._truth = posture
+        self.truth = posture
 
     @override
     def distances(self, origins: Array, directions: Array, reach: float, height: float) -> Array:

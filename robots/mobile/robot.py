@@ -103,11 +103,14 @@ class MobileRobot(Closing, ABC):
         self._odometry = Odometry(self._train, start)
         self._plan = FloorPlan(room)
         self._steps = 0
-        self._truth = start
-        self._reading = self._train.read((0.0, 0.0))
+        self.truth = start
+        """True posture as plain numbers: as `posture`, in a tenth of the time."""
+        self.encoders = self._train.read((0.0, 0.0))
+        """Last readings of the right and the left encoder: counts, or [rad] if they read exactly."""
         self._sonar: SonarRing | None = None
         self._camera: OverheadCamera | None = None
-        self._scan: SonarScan | None = None
+        self.sonar: SonarScan | None = None
+        """Newest scan; None without sonars."""
         self._every_encoder = self._every(senses.encoder_rate)
         self._laser: LaserScanner | None = None
         self._every_sonar = self._every_frame = self._every_sweep = 0
@@ -131,7 +134,8 @@ class MobileRobot(Closing, ABC):
         if self._period_steps < 1 or abs(self._period_steps * reality.dt - period) > 1e-9:
             raise InvalidValueError("period", period, f"a multiple of the step, {reality.dt:g} s")
         self._collisions: list[Collision] = []
-        self._touches = ""
+        self.touching = ""
+        """What the body touches now, by its name in the room; empty if nothing."""
         thing = self._overlap(start)
         if thing:
             raise InvalidValueError("posture", start, f"one where the robot stands free, not in the {thing}")
@@ -145,12 +149,7 @@ class MobileRobot(Closing, ABC):
     @property
     def posture(self) -> Array:
         """True posture, (3,): middle of the driving axle [m] and heading [rad], not wrapped."""
-        return frozen_array(self._truth)
-
-    @property
-    def truth(self) -> tuple[float, float, float]:
-        """True posture as plain numbers: as `posture`, in a tenth of the time."""
-        return self._truth
+        return frozen_array(self.truth)
 
     @property
     def reckoned(self) -> tuple[float, float, float]:
@@ -161,11 +160,6 @@ class MobileRobot(Closing, ABC):
     @abstractmethod
     def motion(self) -> tuple[float, float]:
         """True speed v of the middle of the axle, forward [m/s], and ω [rad/s]."""
-
-    @property
-    def encoders(self) -> tuple[float, float]:
-        """Last readings of the right and the left encoder: counts, or [rad] if they read exactly."""
-        return self._reading
 
     @property
     def odometry(self) -> Array:
@@ -183,11 +177,6 @@ class MobileRobot(Closing, ABC):
         return self._fix
 
     @property
-    def sonar(self) -> SonarScan | None:
-        """Newest scan; None without sonars."""
-        return self._scan
-
-    @property
     def laser(self) -> LaserScan | None:
         """Newest whole sweep of the laser scanner; None before the first, or without a scanner."""
         return None if self._laser is None else self._laser.newest
@@ -201,11 +190,6 @@ class MobileRobot(Closing, ABC):
     def sonar_places(self) -> Array:
         """Where each sonar sits [m], (16, 2), in the robot's frame; (0, 2) without sonars."""
         return frozen_array(np.zeros((0, 2))) if self._sonar is None else self._sonar.places
-
-    @property
-    def touching(self) -> str:
-        """What the body touches now, by its name in the room; empty if nothing."""
-        return self._touches
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -261,11 +245,11 @@ class MobileRobot(Closing, ABC):
 
     @abstractmethod
     def _begin(self) -> None:
-        """Make what the robot needs to go on, from `_truth`."""
+        """Make what the robot needs to go on, from `truth`."""
 
     @abstractmethod
     def _advance(self, n: int) -> None:
-        """Go n steps on, no sense being due before their end; counts them in `_steps`, sets `_truth`."""
+        """Go n steps on, no sense being due before their end; counts them in `_steps`, sets `truth`."""
 
     @abstractmethod
     def _put(self, posture: tuple[float, float, float]) -> None:
@@ -293,26 +277,26 @@ class MobileRobot(Closing, ABC):
             if self._steps:
                 self._train.wander(self._every_encoder * self.reality.dt)
         if self._camera is not None and self._steps % self._every_frame == 0:
-            self._camera.look(self._truth, self.time)
+            self._camera.look(self.truth, self.time)
         if self._sonar is not None and self._steps % self._every_sonar == 0:
-            origins, directions = self._sonar.rays(self._truth)
+            origins, directions = self._sonar.rays(self.truth)
             found = self.distances(origins, directions, self._sonar.reach, self.chassis.sonar_height)
             if self._sees("sonar ring", found, len(origins)):
-                self._scan = self._sonar.scan(found, self.time)
+                self.sonar = self._sonar.scan(found, self.time)
         if self._laser is not None and self._steps % self._every_sweep == 0:
             self._laser.begin(self.time)
-            self._go_on(self._laser, self._truth, self.time)
+            self._go_on(self._laser, self.truth, self.time)
 
     def _sweep(self, laser: LaserScanner) -> None:
         """Go one step on while the laser sweeps."""
-        before, begun = self._truth, self.time
+        before, begun = self.truth, self.time
         self._advance(1)
         self._go_on(laser, before, begun)
 
     def _go_on(self, laser: LaserScanner, before: tuple[float, float, float], begun: float) -> None:
         """Let the laser sweep from a posture and time on; a sweep with a beam that isn't sound is left out."""
         known = laser.newest
-        laser.go_on(before, self._truth, (begun, self.time), self._cast_laser)
+        laser.go_on(before, self.truth, (begun, self.time), self._cast_laser)
         if laser.newest is not known:
             if not self._beams_sound:
                 laser.newest = known
@@ -326,8 +310,8 @@ class MobileRobot(Closing, ABC):
             sound &= self.watch.see(f"{side} wheel's encoder", angle, *leap, now=self.time)
         if sound:
             self._shafts_read = shafts
-            self._reading = self._train.read(shafts)
-            self._odometry.update(self._reading)
+            self.encoders = self._train.read(shafts)
+            self._odometry.update(self.encoders)
 
     def _sees(self, sensor: str, distances: Array, count: int) -> bool:
         """Whether so many distances are sound; infinite ones met nothing."""
@@ -352,9 +336,9 @@ class MobileRobot(Closing, ABC):
 
     def _touch(self, thing: str) -> None:
         """Note what the body touches; a touch that goes on is one collision."""
-        if thing and thing != self._touches and len(self._collisions) < MOST_COLLISIONS:
+        if thing and thing != self.touching and len(self._collisions) < MOST_COLLISIONS:
             self._collisions.append(Collision(self.time, thing))
-        self._touches = thing
+        self.touching = thing
 
 
 _CHECKS = 60.0
@@ -375,7 +359,7 @@ class BareBody(MobileRobot):
         self._speed = (0.0, 0.0)
         self._every_check = self._every(_CHECKS)
         self._free_until = 0
-        self._free = self._truth
+        self._free = self.truth
         self._seen: dict[float, FloorPlan] = {}
 
     @property
@@ -393,7 +377,7 @@ class BareBody(MobileRobot):
             if self._steps % every == 0:
                 if self._steps >= self._free_until:
                     self._look_out()
-                self._free = self._truth
+                self._free = self.truth
             n -= part
 
     def _roll(self, n: int) -> None:
@@ -401,7 +385,7 @@ class BareBody(MobileRobot):
         slip_right, slip_left = train.slips
         k_right, k_left = train.radii[0] * (1 - slip_right), train.radii[1] * (1 - slip_left)
         base, step, cos, sin = train.base, train.step, math.cos, math.sin
-        x, y, theta = self._truth
+        x, y, theta = self.truth
         angle_right, angle_left = self._angle_right, self._angle_left
         v = w = 0.0
         for _ in range(n):
@@ -417,13 +401,13 @@ class BareBody(MobileRobot):
             y += chord * sin(theta + half)
             theta += w * dt
         self._angle_right, self._angle_left = angle_right, angle_left
-        self._truth, self._speed = (x, y, theta), (v, w)
+        self.truth, self._speed = (x, y, theta), (v, w)
         self._steps += n
 
     def _look_out(self) -> None:
         """Stay where the way leads into something; or work out how long nothing can be met."""
         body = self.chassis
-        x, y, _ = centre_of(self._truth, body.centre_x)
+        x, y, _ = centre_of(self.truth, body.centre_x)
         space = self._plan.clearance(x, y, self.time) - body.reach
         if space > 0:
             self._touch("")
@@ -433,10 +417,10 @@ class BareBody(MobileRobot):
             steps = min(space / fastest, changes - self.time) / self.reality.dt
             self._free_until = self._steps + int(min(steps, 1e9))
             return
-        thing = self._overlap(self._truth)
+        thing = self._overlap(self.truth)
         self._touch(thing)
         if thing:
-            self._truth = self._free
+            self.truth = self._free
             self._speed = 0.0, 0.0
 
     @override
@@ -444,7 +428,7 @@ class BareBody(MobileRobot):
         return self._angle_right, self._angle_left
 
     def _put(self, posture: tuple[float, float, float]) -> None:
-        self._truth = self._free = posture
+        self.truth = self._free = posture
         self._speed, self._free_until = (0.0, 0.0), 0
 
     @override

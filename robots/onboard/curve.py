@@ -101,29 +101,11 @@ _CLOSE = 1e-14
 
 def _cubic_spline(points: Array) -> Array:
     """Coefficients of a natural cubic spline by chord length, (k − 1, 4, 2), ascending in u from 0 to 1."""
+    from scipy.interpolate import CubicSpline
+
     h = np.hypot(*np.diff(points, axis=0).T)
-    slope = np.diff(points, axis=0) / h[:, None]
-    bend = np.zeros_like(points)
-    if len(points) > 2:
-        bend[1:-1] = _tridiagonal(h, 6.0 * np.diff(slope, axis=0))
-    h = h[:, None]
-    tangent = slope - h * (2 * bend[:-1] + bend[1:]) / 6
-    return np.stack([points[:-1], h * tangent, h * h * bend[:-1] / 2, h * h * np.diff(bend, axis=0) / 6], 1)
-
-
-def _tridiagonal(h: Array, right: Array) -> Array:
-    """Second derivatives at the inner points of a natural spline with chords h. Source: Thomas's algorithm."""
-    n = len(right)
-    diagonal, over = 2.0 * (h[:-1] + h[1:]), h[1:-1]
-    share, made = np.zeros(n), np.array(right)
-    for k in range(n):
-        below = over[k - 1] if k else 0.0
-        pivot = diagonal[k] - below * (share[k - 1] if k else 0.0)
-        share[k] = over[k] / pivot if k < n - 1 else 0.0
-        made[k] = (right[k] - (below * made[k - 1] if k else 0.0)) / pivot
-    for k in range(n - 2, -1, -1):
-        made[k] -= share[k] * made[k + 1]
-    return made
+    spline = CubicSpline(np.concatenate([[0.0], np.cumsum(h)]), points, bc_type="natural")
+    return np.asarray(spline.c[::-1].swapaxes(0, 1) * h[:, None, None] ** np.arange(4)[:, None])
 
 
 def _quadratic_spline(points: Array) -> Array:
@@ -154,12 +136,8 @@ def _evaluated(pieces: Array, u: Array) -> tuple[Array, Array, Array]:
 
 def _speeds(pieces: Array, u: Array) -> Array:
     """|dp/du| at u (k, m) of pieces (k, degree + 1, 2), (k, m)."""
-    pieces = pieces.reshape(len(u), -1, 2)
-    k = np.arange(1, pieces.shape[1], dtype=np.float64)
-    powers = u[..., None] ** (k - 1)
-    velocity = np.einsum("kmj,kjd->kmd", powers, pieces[:, 1:] * k[:, None])
-    speed: Array = np.hypot(velocity[..., 0], velocity[..., 1])
-    return speed
+    velocity = _evaluated(np.repeat(pieces, u.shape[1], axis=0), u.ravel())[1]
+    return np.asarray(np.hypot(*velocity.T).reshape(u.shape))
 
 
 def _derivatives(rows: list[list[float]], u: float) -> tuple[tuple[float, float], ...]:

@@ -176,9 +176,9 @@ class GspMap:
 
     def to_json(self) -> str:
         """The map as text; numbers read back exactly."""
-        lines, counts = self.lines, self.lines.counts.tolist()
-        columns = [a.tolist() for a in (lines.poses, lines.spans, lines.variances)]
-        file = _MapFile(SCHEMA, self.name, *columns, counts=counts, covariance=self.covariance.tolist())
+        lines = self.lines
+        arrays = (lines.poses, lines.spans, lines.variances, lines.counts, self.covariance)
+        file = _MapFile(SCHEMA, self.name, *(array.tolist() for array in arrays))
         return msgspec.json.encode(file).decode() + "\n"
 
 
@@ -210,8 +210,8 @@ def read_map(text: str, where: str = "map") -> GspMap:
     try:
         file = msgspec.json.decode(text, type=_MapFile)
         m = len(file.counts)
-        shaped = (np.array(a).reshape(m, k) for a, k in ((file.poses, 3), (file.spans, 2), (file.variances, 2)))
-        lines = Lines.of(*shaped, file.counts)
+        poses, spans = np.array(file.poses).reshape(m, 3), np.array(file.spans).reshape(m, 2)
+        lines = Lines.of(poses, spans, np.array(file.variances).reshape(m, 2), file.counts)
         return GspMap.of(file.name[:80], lines, np.array(file.covariance).reshape(2 * m, 2 * m))
     except (msgspec.MsgspecError, RecursionError, ValueError) as error:
         raise FormatError(where, str(error).splitlines()[0]) from None

@@ -147,7 +147,7 @@ class Localizer:
         """Where the robot may be now, the likeliest first, if that's ambiguous."""
         if self.status is not Status.AMBIGUOUS or self._surveyor is None:
             return ()
-        here = self._surveyor.posture
+        here = self._surveyor.builder.posture
         return tuple(replace(one, posture=composed(one.posture, here)) for one in self._candidates)
 
     @property
@@ -242,21 +242,22 @@ class Localizer:
 
     def _confirmed(self, place: Candidate, surveyor: Surveyor) -> bool:
         """Whether the last scan fits there, too: a robot that was held has lost itself in its own frame."""
-        config = self._config
-        assert surveyor.points is not None
-        here = composed(place.posture, surveyor.posture)
-        found = evidence(self._known.lines, surveyor.points, here, surveyor.noise)
+        config, builder = self._config, surveyor.builder
+        assert builder.points is not None
+        here = composed(place.posture, builder.posture)
+        found = evidence(self._known.lines, builder.points, here, builder.noise)
         return found.through <= config.through and found.explained >= config.confirmed
 
     def _go_on(self, place: Candidate, surveyor: Surveyor) -> None:
         """Track from a place on."""
-        posture = composed(place.posture, surveyor.posture)
-        doubt = compounded(place.posture, place.covariance, surveyor.posture, surveyor.covariance)
+        builder = surveyor.builder
+        posture = composed(place.posture, builder.posture)
+        doubt = compounded(place.posture, place.covariance, builder.posture, builder.covariance)
         self.tracker = tracker = Tracker(self._known, posture, doubt, self._config.localization)
         newest = self.odometry.newest
         assert newest is not None
         tracker.move(self.odometry.time, newest)
-        tracker.noise = surveyor.noise
+        tracker.noise = builder.noise
         self._found(tracker)
 
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from robots.onboard.global_localization import Surroundings
 from robots.onboard.gsp_map import GspMap, Lines
-from robots.onboard.laser import LaserScan, Points
+from robots.onboard.laser import LaserScan
 from robots.onboard.line_filter import LineFilter, Sights
 from robots.onboard.localization import LocalizationConfig, Tracker
 from vrs.checks import validated, within
@@ -201,31 +201,12 @@ class Surveyor:
         self._begin()
 
     def _begin(self) -> None:
-        self._builder = MapBuilder(config=self._config)
+        self.builder = MapBuilder(config=self._config)
+        """What follows the robot in the frame, and knows the last scan."""
         self._contradicted = 0
         self._kept: list[tuple[Array, Array, Array]] = []
         self._last: tuple[float, float, float] | None = None
         self._headings: list[float] = []
-
-    @property
-    def posture(self) -> tuple[float, float, float]:
-        """Where the robot is in the frame, (x, y, θ) [m, m, rad]."""
-        return self._builder.posture
-
-    @property
-    def covariance(self) -> Array:
-        """Of that, (3, 3)."""
-        return self._builder.covariance
-
-    @property
-    def points(self) -> Points | None:
-        """What the last scan saw, in the robot's frame."""
-        return self._builder.points
-
-    @property
-    def noise(self) -> float:
-        """Of the ranges [m]."""
-        return self._builder.noise
 
     @property
     def scans(self) -> int:
@@ -243,23 +224,23 @@ class Surveyor:
 
     def move(self, time: float, reading: tuple[float, float, float]) -> None:
         """Take a reading of the odometry."""
-        self._builder.move(time, reading)
+        self.builder.move(time, reading)
 
     def see(self, scan: LaserScan) -> bool:
         """Take in a scan; returns whether it was: not if it isn't new, or the odometry doesn't cover it yet."""
-        if not self._builder.see(scan):
+        if not self.builder.see(scan):
             return False
         if self._lost():
             self._begin()
             return True
-        here = self.posture
+        here = self.builder.posture
         last = self._last
         near = last is not None and math.dist(last[:2], here[:2]) < _WAY and abs(wrapped(here[2] - last[2])) < _TURN
         if near or len(self._kept) >= MOST:
             return True
         self._last = here
         self._headings.append(here[2])
-        points = self._builder.points
+        points = self.builder.points
         assert points is not None
         step = max(1, math.ceil(len(points.beams) / BEAMS))
         origins, ways = placed(points.origins[::step], here), turned(points.ways[::step], here[2])
@@ -268,19 +249,19 @@ class Surveyor:
 
     def _lost(self) -> bool:
         """Whether it doesn't know any more where it is in its own frame, or sees nothing."""
-        points = self._builder.points
+        points = self.builder.points
         assert points is not None
-        through = self._builder.evidence.through > _THROUGH
+        through = self.builder.evidence.through > _THROUGH
         self._contradicted = self._contradicted + 1 if through else 0
         blind = float(np.mean(points.ranges < _BLIND)) > _MOSTLY if len(points.ranges) else True
         return blind or self._contradicted >= _CONTRADICTED
 
     def surroundings(self) -> Surroundings:
         """What was gathered so far."""
-        built = self._builder.built()
+        built = self.builder.built()
         lines = built.lines if len(built.lines) else Lines.none()
         if not self._kept:
             none = frozen_array(np.zeros((0, 2)))
-            return Surroundings(lines, none, none, frozen_array(np.zeros(0)), self.noise)
+            return Surroundings(lines, none, none, frozen_array(np.zeros(0)), self.builder.noise)
         origins, ways, ranges = (frozen_array(np.concatenate(parts)) for parts in zip(*self._kept, strict=True))
-        return Surroundings(lines, origins, ways, ranges, self.noise)
+        return Surroundings(lines, origins, ways, ranges, self.builder.noise)

@@ -16,10 +16,10 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from robots.onboard.driving import Posture
-from vrs.checks import finite, number_in
+from vrs.checks import finite, number_in, positive, validated
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced, wrapped
 
@@ -32,21 +32,19 @@ _EQUAL = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
+@validated
 class Arc:
     """A piece of constant curvature."""
 
     curvature: float
     """Change of θ_d a metre of way [1/m], to the left of the direction of travel positive."""
-    length: float
+    length: Annotated[float, positive("positive metres")]
     """[m], positive."""
     direction: int = 1
     """1 forward, −1 reversing."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "curvature", finite("curvature", self.curvature))
-        object.__setattr__(self, "length", finite("length", self.length, "positive metres"))
-        if self.length <= 0:
-            raise InvalidValueError("length", self.length, "positive metres")
         if isinstance(self.direction, bool) or self.direction not in (1, -1):
             raise InvalidValueError("direction", self.direction, "1 or -1")
 

@@ -130,11 +130,6 @@ class RealArm(Closing):
         """What the arm holds."""
         return self._payload
 
-    @property
-    def closed(self) -> bool:
-        """Whether the arm's world is closed."""
-        return self.world.closed
-
     def run(self, q_ref: ArrayLike, qd_ref: ArrayLike, qdd_ref: ArrayLike) -> Measured:
         """Follow k references, dt apart; reference i is for the end of step i.
 

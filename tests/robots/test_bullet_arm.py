@@ -280,7 +280,7 @@ def test_a_closed_arm_has_given_its_client_back() -> None:
     with RealArm() as arm:
         bullet = arm.world.bullet
         assert bullet.getConnectionInfo()["isConnected"] == 1
-    assert arm.closed
+    assert arm.world.closed
     assert bullet.getConnectionInfo()["isConnected"] == 0
     arm.close()
     with pytest.raises(WorldClosedError):

@@ -31,9 +31,10 @@ N = 3
 @pytest.fixture(autouse=True)
 def eager(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that's over is put away at once, from a tree of small leaves, and next to nothing is kept when read."""
-    for name, value in (("KEPT", 0), ("RECENT", 0.0), ("PATIENCE", 0.0), ("RESERVE", 0), ("READ_LEAVES", 3)):
+    for name, value in (("KEPT", 0), ("RECENT", 0.0), ("PATIENCE", 0.0), ("RESERVE", 0)):
         monkeypatch.setattr(archive, name, value)
-    monkeypatch.setattr(archive, "READ_NODES", 2)
+    monkeypatch.setattr(archive.READ_LEAVES, "most", 3)
+    monkeypatch.setattr(archive.READ_NODES, "most", 2)
     monkeypatch.setattr(archive, "GRANT", 0)
     monkeypatch.setattr(archive, "PORTION", 8)
     monkeypatch.setattr(tree, "LEAF", 4)

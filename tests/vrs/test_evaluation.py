@@ -70,8 +70,8 @@ def test_caches_change_no_bit(monkeypatch: pytest.MonkeyPatch):
 
 def test_caches_are_bounded(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(tree, "LEAF", 32)
-    monkeypatch.setattr(evaluation, "STACKS", 2)
-    monkeypatch.setattr(evaluation, "INDEXES", 2)
+    monkeypatch.setattr(evaluation.STACKS, "most", 2)
+    monkeypatch.setattr(evaluation.INDEXES, "most", 2)
     rng = np.random.default_rng(4)
     timeline = Timeline(np.zeros(N))
     for k in range(3000):

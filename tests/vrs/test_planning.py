@@ -10,7 +10,7 @@ from vrs import Engine, JointTarget, Limits, MotionCommand, Profile
 from vrs.errors import InvalidValueError, PlanningError
 from vrs.planning import jerk_limited, move, overlapped, parabolic, run_up, violation
 from vrs.planning.certificate import bounds
-from vrs.planning.online import online
+from vrs.planning.online import integrated, online
 from vrs.planning.parabolic import ParabolicMove, ParabolicTimes, blend, certified, quickest, slowest_joint
 from vrs.planning.plan import Plan, empty, end_state, integrate
 from vrs.segment import State
@@ -182,8 +182,7 @@ def test_integration_follows_the_control():
     rng = np.random.default_rng(7)
     h, control = rng.uniform(0.1, 1, 5), rng.normal(size=(5, 6))
     state = State(rng.normal(size=6), rng.normal(size=6), rng.normal(size=6))
-    for order in (2, 3):
-        plan = integrate(state, h, control, order)
+    for order, plan in ((2, integrate(state, h, control)), (3, integrated(state, h, control).plan())):
         for i in range(4):
             before = end_state(Plan(h[i : i + 1], plan.coefficients[i : i + 1]))
             after = plan.coefficients[i + 1]

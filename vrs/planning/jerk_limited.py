@@ -12,10 +12,10 @@ from vrs.errors import PlanningError
 from vrs.model import Array, Limits
 from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
-from vrs.planning.online import online
+from vrs.planning.online import integrated, online
 from vrs.planning.parabolic import brake, follow, rates
 from vrs.planning.parabolic import from_rest as parabolic_from_rest
-from vrs.planning.plan import Plan, empty, end_state, integrate
+from vrs.planning.plan import Plan, empty, end_state
 from vrs.planning.steering import change, rates_plan
 from vrs.segment import State
 
@@ -172,5 +172,5 @@ def straight_stop(state: State, limits: Limits) -> Plan | None:
     A, J = (float((bound[moving] / np.abs(d[moving])).min()) for bound in (limits.qdd_max, limits.qddd_max))
     phases = change(1.0, acceleration, 0.0, A * (1.0 - 1e-12), J * (1.0 - 1e-12))
     h, jerks = np.array([phase[0] for phase in phases]), np.array([phase[1] for phase in phases])
-    plan = integrate(State(state.q, d, acceleration * d), h, jerks[:, None] * d, 3)
+    plan = integrated(State(state.q, d, acceleration * d), h, jerks[:, None] * d).plan()
     return plan if violation(plan, limits, jerk=True) is None else None

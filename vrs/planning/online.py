@@ -301,7 +301,7 @@ def _exact(start: State, goal: State, h: Array, control: Array, order: int) -> C
             made = integrated(start, h, control)
             end = made.end
         else:
-            made = integrate(start, h, control, 2)
+            made = integrate(start, h, control)
             last = end_state(made)
             end = np.array([last.q, last.qd])
         error = math.dist(aim, end.ravel().tolist())

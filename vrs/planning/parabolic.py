@@ -510,7 +510,7 @@ def brake(state: State, limits: Limits) -> Plan:
     rate = np.copysign(limits.qdd_max, -state.qd)
     h = knots.copy()
     h[1:] -= knots[:-1]
-    return integrate(state, h, np.where(needed >= knots[:, None], rate, 0.0), 2)
+    return integrate(state, h, np.where(needed >= knots[:, None], rate, 0.0))
 
 
 def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> Plan:
@@ -537,7 +537,7 @@ def from_rest(start: Array, goal: State, speed: float, limits: Limits) -> Plan:
     braking = brake(State(goal.q, -goal.qd, goal.qdd), limits)
     stop = end_state(braking)
     h = braking.durations[::-1].copy()
-    run_up = integrate(State(stop.q, still, still), h, 2.0 * braking.coefficients[::-1, 2], 2)
+    run_up = integrate(State(stop.q, still, still), h, 2.0 * braking.coefficients[::-1, 2])
     plan = rest_to_rest(start, stop.q, speed, limits).then(run_up)
     problem = violation(plan, limits, jerk=False)
     if problem is not None:

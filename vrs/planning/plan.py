@@ -106,41 +106,22 @@ def slowed(plan: Plan, factor: float) -> Plan:
     return Plan(plan.durations * factor, plan.coefficients * powers[:, None], plan.orders)
 
 
-def integrate(state: State, durations: Array, control: Array, order: int) -> Plan:
-    """Polynomials of a piecewise constant control.
+def integrate(state: State, durations: Array, accelerations: Array) -> Plan:
+    """Parabolas of piecewise constant accelerations.
 
     Args:
         state: Start.
         durations: [s], (m,).
-        control: Acceleration (order 2) or jerk (order 3) of each interval, (m, n).
-        order: 2 or 3.
+        accelerations: Of each interval [rad/s²], (m, n).
     """
-    m, n = control.shape
+    m, n = accelerations.shape
     h = durations[:, None]
-    half = 0.5 * h
-    knots = np.empty((order + 1, m + 1, n))
-    knots[order, :m] = control
-    change = h * control
-    knots[order - 1, 0] = state.qd if order == 2 else state.qdd
-    knots[order - 1, 1:] = change
-    np.add.accumulate(knots[order - 1], 0, None, knots[order - 1])
-    if order == 3:
-        qd, qdd = knots[1], knots[2]
-        qd[0] = state.qd
-        np.multiply(qdd[:-1] + qdd[1:], half, out=qd[1:])
-        np.add.accumulate(qd, 0, None, qd)
-    q = knots[0]
-    q[0] = state.q
-    steps = knots[1, :-1] + knots[1, 1:]
-    if order == 3:
-        # Of a cubic: h (qd + qd')/2 + h² (qdd − qdd')/12.
-        change *= half * (1.0 / 3.0)
-        steps -= change
-    np.multiply(steps, half, out=q[1:])
+    q, qd = np.empty((2, m + 1, n))
+    qd[0], qd[1:] = state.qd, h * accelerations
+    np.add.accumulate(qd, 0, None, qd)
+    q[0], q[1:] = state.q, (qd[:-1] + qd[1:]) * (0.5 * h)
     np.add.accumulate(q, 0, None, q)
-    a = np.empty((m, order + 1, n))
-    np.multiply(knots[:, :m].swapaxes(0, 1), TAYLOR[: order + 1], out=a)
-    return Plan(durations, a)
+    return Plan(durations, np.stack([q[:m], qd[:m], 0.5 * accelerations], 1))
 
 
 def end_state(plan: Plan) -> State:

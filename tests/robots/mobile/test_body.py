@@ -326,7 +326,7 @@ def test_a_closed_robot_is_of_no_use() -> None:
     body = MobileBody(MICRO, START)
     body.close()
     body.close()
-    assert body.closed
+    assert body.world.closed
     with pytest.raises(WorldClosedError):
         body.follow(0.1, 0.0)
 
