@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import PROFILES
+from interfaces.cli.options import PROFILES, Workers, argument, option
 from interfaces.cli.reproduce import measured, show
 from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
@@ -101,96 +101,72 @@ def send(out: Path, seed: int, goals: int | None, workers: int, *, as_json: bool
 
 
 def lab(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where runs.csv, summary.json and figures go.")],
+    out: Annotated[Path, option("DIR", "Where runs.csv, summary.json and figures go.")],
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="localization|goals",
-            help="How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
+        argument(
+            "localization|goals",
+            "How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
             " architectures.",
         ),
     ] = "",
     architecture: Annotated[
         list[str] | None,
-        typer.Option(
-            "--architecture",
-            metavar="A",
-            help="I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable, III and "
+        option(
+            "A",
+            "I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable, III and "
             "timeline unless given.",
         ),
     ] = None,
-    transport: Annotated[
-        list[str] | None,
-        typer.Option("--transport", metavar="T", help="stream or datagrams (unless given); repeatable."),
-    ] = None,
+    transport: Annotated[list[str] | None, option("T", "stream or datagrams (unless given); repeatable.")] = None,
     delay: Annotated[
-        list[str] | None,
-        typer.Option("--delay", metavar="PROFILE", help=f"Delay one way, thu unless given; repeatable: {PROFILES}"),
+        list[str] | None, option("PROFILE", f"Delay one way, thu unless given; repeatable: {PROFILES}")
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option(
-            "--robot",
-            metavar="NAME|MODULE:NAME",
-            help=f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the "
+        option(
+            "NAME|MODULE:NAME",
+            f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the "
             "usual one without physics; repeatable.",
         ),
     ] = None,
     operator: Annotated[
         list[str] | None,
-        typer.Option(
-            "--operator",
-            metavar="O",
-            help="figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
+        option(
+            "O",
+            "figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
             "MODULE:NAME of your own; repeatable.",
         ),
     ] = None,
     position: Annotated[
         str | None,
-        typer.Option(
-            "--position",
-            metavar="P",
-            help="What tells the robot where it is: fused (unless given), laser, odometry, truth.",
-        ),
+        option("P", "What tells the robot where it is: fused (unless given), laser, odometry, truth."),
     ] = None,
     runs: Annotated[
         int | None,
-        typer.Option(
-            "--runs",
+        option(
+            "K",
+            "Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
             min=1,
             max=10_000,
-            metavar="K",
-            help="Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
         ),
     ] = None,
     starts: Annotated[
-        int | None,
-        typer.Option(
-            "--starts", min=1, max=10_000, metavar="K", help="Of localization: starts anywhere, 200 unless given."
-        ),
+        int | None, option("K", "Of localization: starts anywhere, 200 unless given.", min=1, max=10_000)
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="The first seed.")] = 0,
+    seed: Annotated[int, option("N", "The first seed.", min=0, max=2**32 - 1)] = 0,
     length: Annotated[
         float | None,
-        typer.Option(
-            "--length",
-            min=2,
-            max=3600,
-            metavar="S",
-            help="For how long the operator drives [s]; 120, of localization 60.",
-        ),
+        option("S", "For how long the operator drives [s]; 120, of localization 60.", min=2, max=3600),
     ] = None,
-    workers: Annotated[
-        int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
-    ] = 2,
+    workers: Workers = 2,
     record: Annotated[
-        bool, typer.Option("--record", help="Keep each run as runs/NAME.mcap in DIR; changes no figure.")
+        bool, option("--record", "Keep each run as runs/NAME.mcap in DIR; changes no figure.")
     ] = False,
     attribution: Annotated[
-        bool,
-        typer.Option("--attribution", help="Say how much is due to delay, model, localization and environment."),
+        bool, option("--attribution", "Say how much is due to delay, model, localization and environment.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Write the summary on standard output too.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the summary on standard output too.")] = False,
 ) -> None:
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
     from vrs.checks import one_of
@@ -236,8 +212,8 @@ def lab(
         "architecture": architectures, "transport": transports, "delay": delays, "robot": robots,
         "operator": operators,
     }  # fmt: skip
-    for option, given in combined_of.items():
-        _once(option, given)
+    for what_given, given in combined_of.items():
+        _once(what_given, given)
     for profile in delays:
         delay_profile(profile)
     for name in architectures:

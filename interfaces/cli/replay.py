@@ -16,8 +16,10 @@ from interfaces.cli.options import (
     RecordedRobot,
     TokenFile,
     access_for,
+    argument,
     asked_for,
     end_on_signal,
+    option,
     recorded_robot,
 )
 from vrs.checks import one_of
@@ -38,37 +40,20 @@ RERUN = ("identical", "commands", "versions", "difference", "missing")
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="OTHER.mcap", help="Another one, shown beside it.")
-    ] = None,
-    at: Annotated[
-        float | None,
-        typer.Option("--at", metavar="T", help="Where to begin [s]; alone with --headless: that instant."),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option("--rate", metavar="R", help="−8 to 8, but not 0; negative rewinds. 1 by default."),
-    ] = None,
-    loop: Annotated[str | None, typer.Option("--loop", metavar="A:B", help="Loop from A to B [s].")] = None,
+    run: Annotated[Path, argument("RUN.mcap", "A recording.")],
+    other: Annotated[Path | None, argument("OTHER.mcap", "Another one, shown beside it.")] = None,
+    at: Annotated[float | None, option("T", "Where to begin [s]; alone with --headless: that instant.")] = None,
+    rate: Annotated[float | None, option("R", "−8 to 8, but not 0; negative rewinds. 1 by default.")] = None,
+    loop: Annotated[str | None, option("A:B", "Loop from A to B [s].")] = None,
     align: Annotated[
         str,
-        typer.Option(
-            "--align",
-            metavar="CLOCK",
-            help="Of two recordings: timeline, start (their beginnings) or began (the calendar).",
-        ),
+        option("CLOCK", "Of two recordings: timeline, start (their beginnings) or began (the calendar)."),
     ] = "timeline",
-    headless: Annotated[
-        bool, typer.Option("--headless", help="Frames as lines, at their time, instead of a page.")
-    ] = False,
-    frames: Annotated[
-        float, typer.Option("--frames", metavar="HZ", help="Frames a second of your time, with --headless.")
-    ] = 30.0,
-    as_json: Annotated[bool, typer.Option("--json", help="With --headless or --commands: JSON lines.")] = False,
+    headless: Annotated[bool, option("--headless", "Frames as lines, at their time, instead of a page.")] = False,
+    frames: Annotated[float, option("HZ", "Frames a second of your time, with --headless.")] = 30.0,
+    as_json: Annotated[bool, option("--json", "With --headless or --commands: JSON lines.")] = False,
     commands: Annotated[
-        bool,
-        typer.Option("--commands", help="Run the commands again on a fresh engine: is the timeline the same?"),
+        bool, option("--commands", "Run the commands again on a fresh engine: is the timeline the same?")
     ] = False,
     name: RecordedRobot = None,
     host: Host = "127.0.0.1",

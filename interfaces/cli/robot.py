@@ -31,6 +31,7 @@ from interfaces.cli.options import (
     is_loopback,
     keep_quiet,
     left_out,
+    option,
     room_of,
     saying_policy,
 )
@@ -148,67 +149,45 @@ POSE = "nominal"
 def robot(
     ctx: typer.Context,
     rsp: Annotated[
-        str | None,
-        typer.Option(
-            "--rsp",
-            metavar="HOST:PORT",
-            help="Be a thin client instead, that is driven by RSP over UDP here.",
-        ),
+        str | None, option("HOST:PORT", "Be a thin client instead, that is driven by RSP over UDP here.")
     ] = None,
     rsp_model: Annotated[
-        Path | None,
-        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than its own."),
+        Path | None, option("--model FILE.xmi", "With --rsp: another robot model than its own.")
     ] = None,
     listen: Annotated[
-        str,
-        typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
+        str, option("HOST:PORT", "Where an operator's site connects; port 0 for any.")
     ] = "127.0.0.1:8601",
     name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
-        str,
-        typer.Option(
-            "--offset", metavar="OFFSET", help="How far behind the operator it plays: adaptive or fixed:S."
-        ),
+        str, option("OFFSET", "How far behind the operator it plays: adaptive or fixed:S.")
     ] = "adaptive",
     link_loss: Annotated[
         str,
-        typer.Option(
-            "--link-loss",
-            metavar="POLICY",
-            help="Unless the operator's site says otherwise. halt: stop when nothing fresh comes for "
+        option(
+            "POLICY",
+            "Unless the operator's site says otherwise. halt: stop when nothing fresh comes for "
             "--timeout, and wait for a resume; hold: wait and go on.",
         ),
     ] = "halt",
     operator_loss: OperatorLossName = OPERATOR_LOSS,
-    timeout: Annotated[
-        float, typer.Option("--timeout", metavar="S", help="T_loss under halt [s], 0.1 to 2.")
-    ] = 0.5,
+    timeout: Annotated[float, option("S", "T_loss under halt [s], 0.1 to 2.")] = 0.5,
     max_age: Annotated[
         float,
-        typer.Option(
-            "--max-age",
-            metavar="S",
-            help="Oldest message that counts under halt [s], 0.01 to 2; doubt about the clocks is added.",
-        ),
+        option("S", "Oldest message that counts under halt [s], 0.01 to 2; doubt about the clocks is added."),
     ] = 0.5,
     lead: Annotated[
-        float,
-        typer.Option(
-            "--lead", metavar="S", help="How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay."
-        ),
+        float, option("S", "How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay.")
     ] = 0.05,
     body: BodyName = "",
-    friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
-    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = POSE,
-    reports: Annotated[
-        float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
-    ] = 30.0,
+    friction: Annotated[bool, option("--friction/--no-friction", "Friction in its joints.")] = True,
+    pose: Annotated[str, option("NAME", "Named pose to begin in.")] = POSE,
+    reports: Annotated[float, option("N", "How often it says where it is [1/s], 1 to 200.")] = 30.0,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
     until_eof: Annotated[
-        bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
+        bool, option("--until-eof", "End when standard input does, once the robot rests.")
     ] = False,
 ) -> None:
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
