@@ -1,6 +1,6 @@
 """The emulated network between operator and robot."""
 
-from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig, DriftEstimate
+from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig
 from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, PacketOutcome, Service
 from interfaces.link.delays import (
     ConstantDelay,
@@ -13,7 +13,7 @@ from interfaces.link.delays import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, Stream, direction
+from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, Stream
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
 from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord, Totals
 from interfaces.link.quantiles import SlidingQuantiles
@@ -21,7 +21,6 @@ from interfaces.link.round_trip import (
     DelayStatistics,
     Echo,
     EchoRefusal,
-    LinkStatistics,
     Probe,
     ProbeConfig,
     RelativeDelays,
@@ -44,7 +43,6 @@ __all__ = [
     "DelayStatistics",
     "Delivery",
     "Direction",
-    "DriftEstimate",
     "Echo",
     "EchoRefusal",
     "GammaDelay",
@@ -56,7 +54,6 @@ __all__ = [
     "Link",
     "LinkConditions",
     "LinkPath",
-    "LinkStatistics",
     "LossModel",
     "LossReason",
     "PacketLog",
@@ -75,7 +72,6 @@ __all__ = [
     "TraceDelay",
     "WindowConfig",
     "delay_profile",
-    "direction",
     "loss_model",
     "spelled_loss",
 ]

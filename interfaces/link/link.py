@@ -10,8 +10,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from interfaces.link.conditions import MAX_COUNT, Conditions, LinkConditions, LinkPath, Service
-from interfaces.link.delays import DelayProfile
+from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, Service
 from interfaces.link.packets import MAX_RECORDS, LossReason, PacketLog, PacketRecord
 from vrs.checks import integer_in
 from vrs.commands import finite
@@ -38,30 +37,20 @@ class Channel(Generic[T]):
     behind a lost one don't wait for it, as with sequence numbers on datagrams. A byte stream is `Stream`.
 
     Args:
-        profile: How long packets take; or all conditions of the direction, whose own delay, service and
-            capacity then hold.
+        conditions: What it does to packets.
         rng: Source of everything random in it.
-        service: Order of delivery.
-        capacity: Most packets in flight, ≥ 1; what is sent beyond it is lost.
         path: A path to share with other channels instead of one of its own; its conditions decide the fates.
         log: Where to write down what becomes of each packet, instead of a log of its own.
     """
 
     def __init__(
         self,
-        profile: DelayProfile | Conditions,
+        conditions: Conditions,
         rng: np.random.Generator,
-        service: Service = Service.IN_ORDER,
-        capacity: int = 10_000,
         *,
         path: LinkPath | None = None,
         log: PacketLog | None = None,
     ) -> None:
-        if isinstance(profile, Conditions):
-            conditions = profile
-        else:
-            integer_in("capacity", capacity, 1, MAX_COUNT)
-            conditions = Conditions(delay=profile, service=Service(service), capacity=capacity)
         self._conditions = conditions
         self._path = LinkPath(conditions, rng) if path is None else path
         self._flight: list[tuple[float, int, Delivery[T], PacketRecord]] = []
@@ -467,12 +456,3 @@ class Link(Generic[T, U]):
         """When the next packet arrives in either direction, or is sent again [s]; None when both are idle."""
         both = (self.forward.next_deadline(), self.backward.next_deadline())
         return min((t for t in both if t is not None), default=None)
-
-
-def direction(
-    conditions: Conditions, rng: np.random.Generator, *, path: LinkPath | None = None, log: PacketLog | None = None
-) -> Channel[T] | Stream[T]:
-    """Make one direction: a `Channel` for datagrams, a `Stream` for in-order service."""
-    if conditions.service is Service.IN_ORDER:
-        return Stream(conditions, rng, path=path, log=log)
-    return Channel(conditions, rng, path=path, log=log)

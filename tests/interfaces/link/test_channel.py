@@ -31,7 +31,6 @@ from interfaces.link import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.link import direction
 from vrs.errors import InvalidValueError
 
 PROFILES = ("none", "constant:0.3", "domain", "mon", "tue@0.2", "thu@0", "fri@20", "gamma:0.2,0.3,0.05", "lunar")
@@ -231,7 +230,7 @@ def test_reordering_beyond_what_delays_make():
 def test_datagrams_overtake_and_a_byte_stream_does_not():
     rng = np.random.default_rng
     for service in Service:
-        line = direction(Conditions(delay=delay_profile("tue"), service=service), rng(0))
+        line = (Stream if service is Service.IN_ORDER else Channel)(Conditions(delay=delay_profile("tue")), rng(0))
         order = [item.payload for item in drive(line, [(1.0, 0, True)] * 300)[0]]
         assert (order == sorted(order)) is (service is Service.IN_ORDER)
 
@@ -250,7 +249,7 @@ def test_switching_an_impairment_on_leaves_the_delays_as_they_were():
 
 def test_same_seed_same_arrivals():
     runs = [
-        drive(Channel(delay_profile("fri"), np.random.default_rng(seed), Service.DATAGRAM), [(0.3, 0, True)] * 50)
+        drive(Channel(Conditions(delay=delay_profile("fri")), np.random.default_rng(seed)), [(0.3, 0, True)] * 50)
         for seed in (5, 5, 6)
     ]
     assert runs[0] == runs[1]
@@ -359,7 +358,7 @@ def test_flows_that_share_a_path_share_its_bandwidth():
 def test_the_models_load_neither_asyncio_nor_sockets_nor_scipy():
     probe = (
         "import sys, interfaces.link as link, numpy as np\n"
-        "link.Channel(link.delay_profile('thu'), np.random.default_rng(0)).send(1, 0.0)\n"
+        "link.Channel(link.Conditions(link.delay_profile('thu')), np.random.default_rng(0)).send(1, 0.0)\n"
         "print(*sorted({'asyncio', 'socket', 'scipy', 'selectors'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
