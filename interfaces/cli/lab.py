@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,11 +18,10 @@ from vrs.errors import InvalidValueError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.lab import Paper, Reproduction, Study
     from interfaces.lab.runner import Calls, Made
 
-LOCALIZATION: Final = "localization"
-"""What the command line calls it."""
+LOCALIZATION, GOALS = "localization", "goals"
+"""What the command line calls them."""
 
 
 def refuse(what: str, others: Mapping[str, object]) -> None:
@@ -36,68 +35,47 @@ def refuse(what: str, others: Mapping[str, object]) -> None:
         raise InvalidValueError("options", " ".join(given), f"left out for {what}")
 
 
-def localize(
-    out: Path, seed: int, rooms: int | None, length: float | None, starts: int, workers: int, *, as_json: bool
-) -> None:
-    """Measure it, write summary.json, runs.csv and pictures, and show tables or JSON.
-
-    Args:
-        out: Where they go.
-        seed: Of everything random.
-        rooms: In which accuracy is measured, 2 to 1000; 30 if None.
-        length: Of a drive [s]; 60 if None.
-        starts: From which a robot that knows nothing is found.
-        workers: Processes at once.
-        as_json: Whether JSON goes to standard output, instead of tables.
-    """
-    from interfaces.lab import Study
-    from interfaces.lab.localization import study as rooms_study
-
-    most = rooms_study.ROOMS if rooms is None else rooms
-    study = Study(seed, most, rooms_study.LENGTH if length is None else length)
-    _measured(rooms_study.study_of(most, starts), study, out, rooms_study.write, workers, as_json=as_json)
-
-
-def _measured(
-    paper: Paper,
-    study: Study,
+def study(
+    what: str,
     out: Path,
-    write: Callable[[Reproduction, Path], None],
+    seed: int,
+    runs: int | None,
+    length: float | None,
+    starts: int | None,
     workers: int,
     *,
     as_json: bool,
 ) -> None:
-    """Measure a study, write what came of it, and show tables or JSON."""
-    from interfaces.lab.output import to_json
-
-    prepare(out, "runs.csv", "summary.json")
-    found = measured(paper, study, workers)
-    write(found, out)
-    if as_json:
-        typer.echo(to_json(found), nl=False)
-    else:
-        show(found, out / "summary.json")
-
-
-GOALS: Final = "goals"
-"""What the command line calls it."""
-
-
-def send(out: Path, seed: int, goals: int | None, workers: int, *, as_json: bool) -> None:
-    """Measure it, write summary.json, runs.csv and maps, and show tables or JSON.
+    """Measure localization or goals, write summary.json, runs.csv and pictures, and show tables or JSON.
 
     Args:
-        out: Where they go.
+        what: `LOCALIZATION` or `GOALS`.
+        out: Where the files go.
         seed: Of everything random.
-        goals: Among furniture and doors, 2 to 1000; 100 if None.
+        runs: Rooms in which accuracy is measured, or goals among furniture and doors, 2 to 1000; 30 or 100 if None.
+        length: Of a drive in a room [s]; 60 if None.
+        starts: From which a robot that knows nothing is found; 200 if None.
         workers: Processes at once.
         as_json: Whether JSON goes to standard output, instead of tables.
     """
     from interfaces.lab import Study
     from interfaces.lab.goals import study as trips
+    from interfaces.lab.localization import study as rooms
+    from interfaces.lab.output import to_json
 
-    study = Study(seed, trips.GOALS if goals is None else goals)
-    _measured(trips.study_of(study.runs), study, out, trips.write, workers, as_json=as_json)
+    if what == GOALS:
+        asked = Study(seed, trips.GOALS if runs is None else runs)
+        paper, write = trips.study_of(asked.runs), trips.write
+    else:
+        asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
+        paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
+    prepare(out, "runs.csv", "summary.json")
+    found = measured(paper, asked, workers)
+    write(found, out)
+    if as_json:
+        typer.echo(to_json(found), nl=False)
+    else:
+        show(found, out / "summary.json")
 
 
 def lab(
@@ -177,12 +155,8 @@ def lab(
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
             "--operator": operator, "--position": position, "--attribution": attribution, "--record": record,
         }  # fmt: skip
-        if what == GOALS:
-            refuse(what, {**others, "--length": length, "--starts": starts})
-            send(out, seed, runs, workers, as_json=as_json)
-            return
-        refuse(what, others)
-        localize(out, seed, runs, length, 200 if starts is None else starts, workers, as_json=as_json)
+        refuse(what, {**others, "--length": length, "--starts": starts} if what == GOALS else others)
+        study(what, out, seed, runs, length, starts, workers, as_json=as_json)
         return
     refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0
