@@ -227,6 +227,22 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
+    """The tokens of a file, which is made if it's missing; None without one, where only this machine comes in.
+
+    Raises:
+        InvalidValueError: If other machines would come in without tokens.
+        FormatError: If the file can't be used.
+    """
+    from interfaces.stream.access import make_tokens, read_tokens
+
+    if token_file is None:
+        if not is_loopback(host):
+            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
+        return None
+    return read_tokens(token_file) if token_file.exists() else make_tokens(token_file)
+
+
 def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
     """Who may come in: with a token file whoever has a token, without one whoever is on this machine.
 
@@ -239,13 +255,10 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
         InvalidValueError: If other machines would come in without tokens.
         FormatError: If the file can't be used.
     """
-    from interfaces.stream.access import Access, make_tokens, read_tokens
+    from interfaces.stream.access import Access
 
-    if token_file is None:
-        if not is_loopback(host):
-            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
-        return Access(free=free)
-    return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
+    tokens = tokens_for(host, token_file)
+    return Access(free=free) if tokens is None else Access(tokens, free=())
 
 
 def names_of(host: str) -> list[str]:

@@ -28,12 +28,12 @@ from interfaces.cli.options import (
     check_taken,
     end_on_signal,
     end_with_input,
-    is_loopback,
     keep_quiet,
     left_out,
     option,
     room_of,
     saying_policy,
+    tokens_for,
 )
 from interfaces.system import software
 from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
@@ -73,7 +73,7 @@ def thin_client(
     import uvloop
 
     from interfaces.link.proxy import parse_address
-    from interfaces.rsp.live import bind
+    from interfaces.rsp.live import bind, keys_of
     from interfaces.rsp.model import read_model
 
     where = parse_address("--rsp", address)
@@ -82,23 +82,17 @@ def thin_client(
     if device is None:
         raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
     robot = read_model(device.model if model is None else model)
-    keys = _keys(where.host, token_file)
+    tokens = tokens_for(where.host, token_file)
+    keys = None if tokens is None else keys_of(tokens, token_file)
     sock = bind(where.host, where.port)
-    problem = uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof))
+    _end(uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof)))
+
+
+def _end(problem: str) -> None:
+    """Say what failed, if anything did, and exit with it."""
     if problem:
         typer.echo(f"vrs: {problem}", err=True)
         raise typer.Exit(1)
-
-
-def _keys(host: str, token_file: Path | None) -> Keyring | None:
-    from interfaces.rsp.live import keys_of
-    from interfaces.stream.access import make_tokens, read_tokens
-
-    if token_file is None:
-        if not is_loopback(host):
-            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
-        return None
-    return keys_of(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), token_file)
 
 
 async def _serve_rsp(
@@ -251,10 +245,7 @@ def robot(
         says = f"{made.name}, {kind}", remark
         return await _serve(LiveRobot(made, access, server=software()), says, address, allowed, until_eof=until_eof)
 
-    problem = uvloop.run(main())
-    if problem:
-        typer.echo(f"vrs: {problem}", err=True)
-        raise typer.Exit(1)
+    _end(uvloop.run(main()))
 
 
 def _offset(text: str) -> float | None:

@@ -116,16 +116,7 @@ class UdpLink:
 _RANKS = {Role.OPERATOR: Rank.OPERATOR, Role.ADMIN: Rank.ADMIN}
 
 
-def read_keys(path: Path) -> Keyring:
-    """The keys of a token file: its operator's and its admin's tokens.
-
-    Raises:
-        FormatError: If it can't be read, others may read it, or it has neither.
-    """
-    return keys_of(read_tokens(path), path)
-
-
-def keys_of(tokens: dict[Role, str], path: Path) -> Keyring:
+def keys_of(tokens: dict[Role, str], path: Path | None) -> Keyring:
     """The keys of tokens from a file.
 
     Raises:
@@ -163,7 +154,7 @@ def opened(
         FormatError: If the address can't be resolved or the file read.
         InvalidValueError: If the timeout isn't finite.
     """
-    keys = None if key_file is None else read_keys(key_file)
+    keys = None if key_file is None else keys_of(read_tokens(key_file), key_file)
     rank = Rank.ADMIN if keys is not None and (takeover or Rank.OPERATOR not in keys) else Rank.OPERATOR
     clock = WallClock()
     config = LocalConfig() if config is None else config
