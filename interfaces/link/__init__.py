@@ -12,7 +12,7 @@ from interfaces.link.delays import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.link import Channel, Lane, Link, Stream
+from interfaces.link.link import Channel, Link
 from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, loss_model, spelled_loss
 from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord
 from interfaces.link.round_trip import (
@@ -36,7 +36,6 @@ __all__ = [
     "GilbertElliottLoss",
     "HeavyTailedDelay",
     "Hop",
-    "Lane",
     "Link",
     "LinkConditions",
     "LinkPath",
@@ -49,7 +48,6 @@ __all__ = [
     "RoundTripEstimator",
     "RouteDelay",
     "Service",
-    "Stream",
     "TraceDelay",
     "delay_profile",
     "loss_model",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interfaces.link.conditions import Conditions, LinkPath, Service
-from interfaces.link.link import Stream
+from interfaces.link.link import Channel
 from interfaces.link.packets import PacketLog
 from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
@@ -58,9 +58,9 @@ class ProxyDirection:
         self._path, self._rng = path, rng
         self.log = PacketLog(keep=1)
 
-    def stream(self) -> Stream[bytes | _Mark]:
+    def stream(self) -> Channel[bytes | _Mark]:
         """A stream for one direction of one connection."""
-        return Stream(self._conditions, self._rng, path=self._path, log=self.log)
+        return Channel(self._conditions, self._rng, path=self._path, log=self.log)
 
 
 class TcpProxy:
@@ -167,7 +167,7 @@ class _End(asyncio.Protocol):
     peer: _End
     """The other socket."""
 
-    def __init__(self, connection: _ProxiedConnection, stream: Stream[bytes | _Mark], proxy: TcpProxy) -> None:
+    def __init__(self, connection: _ProxiedConnection, stream: Channel[bytes | _Mark], proxy: TcpProxy) -> None:
         self._connection, self._stream, self._clock = connection, stream, proxy.clock
         self._timer = Timer(proxy.clock, self._pump, proxy.lateness)
         self.bytes_in_flight = 0
