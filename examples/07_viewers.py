@@ -7,7 +7,7 @@ import numpy as np
 from interfaces import Supervisor, Viewer
 from interfaces.clients.ports import MemoryTransport, RemotePort
 from interfaces.engine_server.site import Site
-from interfaces.link import Channel, ConstantDelay
+from interfaces.link import Channel, Conditions, ConstantDelay
 from interfaces.messages import FrameStatus, ViewForm
 from interfaces.runtime.laboratory import run_parts
 from robots import puma560
@@ -24,7 +24,7 @@ parts = [site]
 
 def connect() -> RemotePort:
     """Join one more client to the site."""
-    there, back = ConstantDelay("there", D_F), ConstantDelay("back", D_B)
+    there, back = Conditions(delay=ConstantDelay("there", D_F)), Conditions(delay=ConstantDelay("back", D_B))
     transport = MemoryTransport(site, Channel(there, rng), Channel(back, rng))
     parts.append(transport)
     return transport.port

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, dialect_of, val_robot
+from interfaces.cli.options import DialectName, RobotName, argument, dialect_of, option, val_robot
 from interfaces.cli.run import text_of
 from robots.robot import USUAL
 
@@ -27,18 +27,12 @@ SUFFERED = 2
 
 
 def check(
-    programs: Annotated[
-        list[Path], typer.Argument(metavar="PROGRAM.v2", help="Files of VAL-II programs and values.")
-    ],
-    program: Annotated[
-        str, typer.Option("--program", metavar="NAME", help="Which program is planned; the first unless given.")
-    ] = "",
-    static: Annotated[
-        bool, typer.Option("--static", help="Only read the programs; don't plan what one would do.")
-    ] = False,
+    programs: Annotated[list[Path], argument("PROGRAM.v2", "Files of VAL-II programs and values.")],
+    program: Annotated[str, option("NAME", "Which program is planned; the first unless given.")] = "",
+    static: Annotated[bool, option("--static", "Only read the programs; don't plan what one would do.")] = False,
     name: RobotName = USUAL,
     dialect: DialectName = "",
-    as_json: Annotated[bool, typer.Option("--json", help="Write the findings as JSON on standard output.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import RecordedRobot, recorded_robot
+from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
 from interfaces.report.tables import FIGURES, shown
 
 if TYPE_CHECKING:
@@ -45,10 +45,10 @@ ROWS = {"arm": ARM_ROWS, "mobile": MOBILE_ROWS}
 
 
 def compare(
-    recording: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
-    other: Annotated[Path | None, typer.Argument(metavar="OTHER.mcap", help="Another to set beside it.")] = None,
+    recording: Annotated[Path, argument("RUN.mcap", "A recording.")],
+    other: Annotated[Path | None, argument("OTHER.mcap", "Another to set beside it.")] = None,
     name: RecordedRobot = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Write the figures as JSON on standard output.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the figures as JSON on standard output.")] = False,
 ) -> None:
     """Say how far apart the twins of a recording were, and why.
 

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, dialect_of, val_robot
+from interfaces.cli.options import DialectName, RobotName, dialect_of, option, val_robot
 from interfaces.system import module_process, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
@@ -37,25 +37,13 @@ _SAYS: Final = re.compile(r"vrs: serving \S+ on (http://\S+)/view\b.*")
 
 def console(
     connect: Annotated[
-        str | None,
-        typer.Option(
-            "--connect", metavar="URL", help="A server, such as ws://127.0.0.1:8600; without it one is begun."
-        ),
+        str | None, option("URL", "A server, such as ws://127.0.0.1:8600; without it one is begun.")
     ] = None,
-    token_file: Annotated[
-        Path | None, typer.Option("--token-file", metavar="FILE", help="Tokens of that server.")
-    ] = None,
-    alone: Annotated[
-        bool, typer.Option("--alone", help="A virtual arm in this process only: no real one, no page.")
-    ] = False,
+    token_file: Annotated[Path | None, option("FILE", "Tokens of that server.")] = None,
+    alone: Annotated[bool, option("--alone", "A virtual arm in this process only: no real one, no page.")] = False,
     name: RobotName = USUAL,
-    delay: Annotated[
-        str,
-        typer.Option("--delay", metavar="PROFILE", help="Emulated on the way to the robot that this begins."),
-    ] = "none",
-    files: Annotated[
-        Path, typer.Option("--files", metavar="DIR", help="Where LOAD and STORE find files.")
-    ] = Path(),
+    delay: Annotated[str, option("PROFILE", "Emulated on the way to the robot that this begins.")] = "none",
+    files: Annotated[Path, option("DIR", "Where LOAD and STORE find files.")] = Path(),
     dialect: DialectName = "",
 ) -> None:
     """Move an arm by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""

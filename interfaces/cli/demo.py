@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import Delay, Offset, Order, Out, RobotName
+from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, Seed, option
 from robots.robot import USUAL, load
 from vrs.errors import FormatError
 
@@ -33,19 +33,14 @@ DEFAULT_SEED = 6
 
 
 def demo(
-    commands: Annotated[
-        Path | None,
-        typer.Option("--commands", metavar="FILE", help="Plan file, JSON lines; the demo's own without it."),
-    ] = None,
+    commands: Annotated[Path | None, option("FILE", "Plan file, JSON lines; the demo's own without it.")] = None,
     name: RobotName = USUAL,
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random.")
-    ] = DEFAULT_SEED,
+    seed: Seed = DEFAULT_SEED,
     out: Out = Path("out"),
-    as_json: Annotated[bool, typer.Option("--json", help="Write the summary as JSON on standard output.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the summary as JSON on standard output.")] = False,
 ) -> None:
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
     from interfaces.link import Conditions, delay_profile

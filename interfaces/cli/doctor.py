@@ -17,6 +17,8 @@ from typing import Annotated
 
 import typer
 
+from interfaces.cli.options import option
+
 PACKAGES = (
     "matplotlib",
     "meshcat",
@@ -157,7 +159,7 @@ CHECKS = (
 
 
 def doctor(
-    as_json: Annotated[bool, typer.Option("--json", help="Write the checks as JSON on standard output.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the checks as JSON on standard output.")] = False,
 ) -> None:
     """Check this machine and say what to mend; exits 1 when something that the demo needs is missing."""
     checks = [check() for check in CHECKS]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import RecordedRobot, recorded_robot
+from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -15,17 +15,12 @@ if TYPE_CHECKING:
 
 
 def export(
-    recording: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
-    to_csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="DIR", help="Write its tables there, as CSV.")
-    ] = None,
+    recording: Annotated[Path, argument("RUN.mcap", "A recording.")],
+    to_csv: Annotated[Path | None, option("--csv DIR", "Write its tables there, as CSV.")] = None,
     to_parquet: Annotated[
-        Path | None,
-        typer.Option("--parquet", metavar="DIR", help="Write its tables there, as Parquet; needs pyarrow."),
+        Path | None, option("--parquet DIR", "Write its tables there, as Parquet; needs pyarrow.")
     ] = None,
-    to_report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE.html", help="Write its report there.")
-    ] = None,
+    to_report: Annotated[Path | None, option("--report FILE.html", "Write its report there.")] = None,
     name: RecordedRobot = None,
 ) -> None:
     """Write a recording as tables (units are in the columns' names), or as the report of its run."""

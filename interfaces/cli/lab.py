@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import PROFILES
+from interfaces.cli.options import PROFILES, Workers, argument, option
 from interfaces.cli.reproduce import measured, show
 from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
@@ -18,11 +18,10 @@ from vrs.errors import InvalidValueError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from interfaces.lab import Paper, Reproduction, Study
     from interfaces.lab.runner import Calls, Made
 
-LOCALIZATION: Final = "localization"
-"""What the command line calls it."""
+LOCALIZATION, GOALS = "localization", "goals"
+"""What the command line calls them."""
 
 
 def refuse(what: str, others: Mapping[str, object]) -> None:
@@ -36,42 +35,42 @@ def refuse(what: str, others: Mapping[str, object]) -> None:
         raise InvalidValueError("options", " ".join(given), f"left out for {what}")
 
 
-def localize(
-    out: Path, seed: int, rooms: int | None, length: float | None, starts: int, workers: int, *, as_json: bool
-) -> None:
-    """Measure it, write summary.json, runs.csv and pictures, and show tables or JSON.
-
-    Args:
-        out: Where they go.
-        seed: Of everything random.
-        rooms: In which accuracy is measured, 2 to 1000; 30 if None.
-        length: Of a drive [s]; 60 if None.
-        starts: From which a robot that knows nothing is found.
-        workers: Processes at once.
-        as_json: Whether JSON goes to standard output, instead of tables.
-    """
-    from interfaces.lab import Study
-    from interfaces.lab.localization import study as rooms_study
-
-    most = rooms_study.ROOMS if rooms is None else rooms
-    study = Study(seed, most, rooms_study.LENGTH if length is None else length)
-    _measured(rooms_study.study_of(most, starts), study, out, rooms_study.write, workers, as_json=as_json)
-
-
-def _measured(
-    paper: Paper,
-    study: Study,
+def study(
+    what: str,
     out: Path,
-    write: Callable[[Reproduction, Path], None],
+    seed: int,
+    runs: int | None,
+    length: float | None,
+    starts: int | None,
     workers: int,
     *,
     as_json: bool,
 ) -> None:
-    """Measure a study, write what came of it, and show tables or JSON."""
+    """Measure localization or goals, write summary.json, runs.csv and pictures, and show tables or JSON.
+
+    Args:
+        what: `LOCALIZATION` or `GOALS`.
+        out: Where the files go.
+        seed: Of everything random.
+        runs: Rooms in which accuracy is measured, or goals among furniture and doors, 2 to 1000; 30 or 100 if None.
+        length: Of a drive in a room [s]; 60 if None.
+        starts: From which a robot that knows nothing is found; 200 if None.
+        workers: Processes at once.
+        as_json: Whether JSON goes to standard output, instead of tables.
+    """
+    from interfaces.lab import Study
+    from interfaces.lab.goals import study as trips
+    from interfaces.lab.localization import study as rooms
     from interfaces.lab.output import to_json
 
+    if what == GOALS:
+        asked = Study(seed, trips.GOALS if runs is None else runs)
+        paper, write = trips.study_of(asked.runs), trips.write
+    else:
+        asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
+        paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
     prepare(out, "runs.csv", "summary.json")
-    found = measured(paper, study, workers)
+    found = measured(paper, asked, workers)
     write(found, out)
     if as_json:
         typer.echo(to_json(found), nl=False)
@@ -79,118 +78,73 @@ def _measured(
         show(found, out / "summary.json")
 
 
-GOALS: Final = "goals"
-"""What the command line calls it."""
-
-
-def send(out: Path, seed: int, goals: int | None, workers: int, *, as_json: bool) -> None:
-    """Measure it, write summary.json, runs.csv and maps, and show tables or JSON.
-
-    Args:
-        out: Where they go.
-        seed: Of everything random.
-        goals: Among furniture and doors, 2 to 1000; 100 if None.
-        workers: Processes at once.
-        as_json: Whether JSON goes to standard output, instead of tables.
-    """
-    from interfaces.lab import Study
-    from interfaces.lab.goals import study as trips
-
-    study = Study(seed, trips.GOALS if goals is None else goals)
-    _measured(trips.study_of(study.runs), study, out, trips.write, workers, as_json=as_json)
-
-
 def lab(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where runs.csv, summary.json and figures go.")],
+    out: Annotated[Path, option("DIR", "Where runs.csv, summary.json and figures go.")],
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="localization|goals",
-            help="How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
+        argument(
+            "localization|goals",
+            "How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
             " architectures.",
         ),
     ] = "",
     architecture: Annotated[
         list[str] | None,
-        typer.Option(
-            "--architecture",
-            metavar="A",
-            help="I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable, III and "
+        option(
+            "A",
+            "I, II, III, III-capped, extended, timeline, or MODULE:NAME of your own; repeatable, III and "
             "timeline unless given.",
         ),
     ] = None,
-    transport: Annotated[
-        list[str] | None,
-        typer.Option("--transport", metavar="T", help="stream or datagrams (unless given); repeatable."),
-    ] = None,
+    transport: Annotated[list[str] | None, option("T", "stream or datagrams (unless given); repeatable.")] = None,
     delay: Annotated[
-        list[str] | None,
-        typer.Option("--delay", metavar="PROFILE", help=f"Delay one way, thu unless given; repeatable: {PROFILES}"),
+        list[str] | None, option("PROFILE", f"Delay one way, thu unless given; repeatable: {PROFILES}")
     ] = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option(
-            "--robot",
-            metavar="NAME|MODULE:NAME",
-            help=f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the "
+        option(
+            "NAME|MODULE:NAME",
+            f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the "
             "usual one without physics; repeatable.",
         ),
     ] = None,
     operator: Annotated[
         list[str] | None,
-        typer.Option(
-            "--operator",
-            metavar="O",
-            help="figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
+        option(
+            "O",
+            "figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
             "MODULE:NAME of your own; repeatable.",
         ),
     ] = None,
     position: Annotated[
         str | None,
-        typer.Option(
-            "--position",
-            metavar="P",
-            help="What tells the robot where it is: fused (unless given), laser, odometry, truth.",
-        ),
+        option("P", "What tells the robot where it is: fused (unless given), laser, odometry, truth."),
     ] = None,
     runs: Annotated[
         int | None,
-        typer.Option(
-            "--runs",
+        option(
+            "K",
+            "Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
             min=1,
             max=10_000,
-            metavar="K",
-            help="Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
         ),
     ] = None,
     starts: Annotated[
-        int | None,
-        typer.Option(
-            "--starts", min=1, max=10_000, metavar="K", help="Of localization: starts anywhere, 200 unless given."
-        ),
+        int | None, option("K", "Of localization: starts anywhere, 200 unless given.", min=1, max=10_000)
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="The first seed.")] = 0,
+    seed: Annotated[int, option("N", "The first seed.", min=0, max=2**32 - 1)] = 0,
     length: Annotated[
         float | None,
-        typer.Option(
-            "--length",
-            min=2,
-            max=3600,
-            metavar="S",
-            help="For how long the operator drives [s]; 120, of localization 60.",
-        ),
+        option("S", "For how long the operator drives [s]; 120, of localization 60.", min=2, max=3600),
     ] = None,
-    workers: Annotated[
-        int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
-    ] = 2,
+    workers: Workers = 2,
     record: Annotated[
-        bool, typer.Option("--record", help="Keep each run as runs/NAME.mcap in DIR; changes no figure.")
+        bool, option("--record", "Keep each run as runs/NAME.mcap in DIR; changes no figure.")
     ] = False,
     attribution: Annotated[
-        bool,
-        typer.Option("--attribution", help="Say how much is due to delay, model, localization and environment."),
+        bool, option("--attribution", "Say how much is due to delay, model, localization and environment.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Write the summary on standard output too.")] = False,
+    as_json: Annotated[bool, option("--json", "Write the summary on standard output too.")] = False,
 ) -> None:
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
     from vrs.checks import one_of
@@ -201,12 +155,8 @@ def lab(
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
             "--operator": operator, "--position": position, "--attribution": attribution, "--record": record,
         }  # fmt: skip
-        if what == GOALS:
-            refuse(what, {**others, "--length": length, "--starts": starts})
-            send(out, seed, runs, workers, as_json=as_json)
-            return
-        refuse(what, others)
-        localize(out, seed, runs, length, 200 if starts is None else starts, workers, as_json=as_json)
+        refuse(what, {**others, "--length": length, "--starts": starts} if what == GOALS else others)
+        study(what, out, seed, runs, length, starts, workers, as_json=as_json)
         return
     refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0
@@ -236,8 +186,8 @@ def lab(
         "architecture": architectures, "transport": transports, "delay": delays, "robot": robots,
         "operator": operators,
     }  # fmt: skip
-    for option, given in combined_of.items():
-        _once(option, given)
+    for what_given, given in combined_of.items():
+        _once(what_given, given)
     for profile in delays:
         delay_profile(profile)
     for name in architectures:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import PROFILES, end_on_signal
+from interfaces.cli.options import PROFILES, Seed, end_on_signal, option
 
 if TYPE_CHECKING:
     from interfaces.link import Conditions, DelayProfile
@@ -27,68 +27,34 @@ class ProxyTransport(enum.StrEnum):
 def link(
     listen: Annotated[
         str,
-        typer.Option(
-            "--listen",
-            metavar="[HOST:]PORT",
-            help="Where clients come: loopback without a host, any free port for 0. No access control.",
+        option(
+            "[HOST:]PORT",
+            "Where clients come: loopback without a host, any free port for 0. No access control.",
         ),
     ],
-    to: Annotated[str, typer.Option("--to", metavar="[HOST:]PORT", help="The server.")],
-    delay: Annotated[str, typer.Option("--delay", metavar="PROFILE", help=f"One-way delay, each way: {PROFILES}")],
+    to: Annotated[str, option("[HOST:]PORT", "The server.")],
+    delay: Annotated[str, option("PROFILE", f"One-way delay, each way: {PROFILES}")],
     delay_back: Annotated[
-        str | None,
-        typer.Option(
-            "--delay-back", metavar="PROFILE", help="One-way delay from the server; as --delay without it."
-        ),
+        str | None, option("PROFILE", "One-way delay from the server; as --delay without it.")
     ] = None,
-    loss: Annotated[
-        str, typer.Option("--loss", metavar="P", help="Share of packets lost, or burst:P,N in bursts of N packets.")
-    ] = "0",
-    duplicate: Annotated[
-        float, typer.Option("--duplicate", min=0, max=1, metavar="P", help="Share of datagrams that arrive twice.")
-    ] = 0.0,
+    loss: Annotated[str, option("P", "Share of packets lost, or burst:P,N in bursts of N packets.")] = "0",
+    duplicate: Annotated[float, option("P", "Share of datagrams that arrive twice.", min=0, max=1)] = 0.0,
     reorder: Annotated[
-        float,
-        typer.Option(
-            "--reorder", min=0, max=1, metavar="P", help="Share of packets held back, beside what delays do."
-        ),
+        float, option("P", "Share of packets held back, beside what delays do.", min=0, max=1)
     ] = 0.0,
-    reorder_by: Annotated[
-        float, typer.Option("--reorder-by", min=0, max=3600, metavar="S", help="How long they are held back [s].")
-    ] = 0.05,
-    bandwidth: Annotated[
-        float,
-        typer.Option("--bandwidth", min=1, metavar="BITS", help="Rate each way [bit/s]; unlimited without it."),
-    ] = math.inf,
+    reorder_by: Annotated[float, option("S", "How long they are held back [s].", min=0, max=3600)] = 0.05,
+    bandwidth: Annotated[float, option("BITS", "Rate each way [bit/s]; unlimited without it.", min=1)] = math.inf,
     queue: Annotated[
         int,
-        typer.Option(
-            "--queue",
-            min=1,
-            max=10_000_000,
-            metavar="N",
-            help="Datagrams that wait for the bandwidth before some are dropped.",
-        ),
+        option("N", "Datagrams that wait for the bandwidth before some are dropped.", min=1, max=10_000_000),
     ] = 1000,
     transport: Annotated[
-        ProxyTransport, typer.Option("--transport", help="What to pass on; both use the same port number.")
+        ProxyTransport, option("--transport", "What to pass on; both use the same port number.")
     ] = ProxyTransport.BOTH,
-    clients: Annotated[
-        int,
-        typer.Option(
-            "--clients", min=1, max=1000, metavar="N", help="Most connections, and most UDP clients, at once."
-        ),
-    ] = 64,
-    idle: Annotated[
-        float,
-        typer.Option(
-            "--idle", min=0.01, max=86400, metavar="S", help="A UDP client is forgotten after so long [s]."
-        ),
-    ] = 60.0,
-    seed: Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random.")] = 0,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Write statistics as JSON on standard output at the end.")
-    ] = False,
+    clients: Annotated[int, option("N", "Most connections, and most UDP clients, at once.", min=1, max=1000)] = 64,
+    idle: Annotated[float, option("S", "A UDP client is forgotten after so long [s].", min=0.01, max=86400)] = 60.0,
+    seed: Seed = 0,
+    as_json: Annotated[bool, option("--json", "Write statistics as JSON on standard output at the end.")] = False,
 ) -> None:
     """Delay, lose and reorder what passes between two programs, until Ctrl-C or SIGTERM."""
     import asyncio

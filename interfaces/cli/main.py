@@ -21,6 +21,7 @@ from interfaces.cli.export import export
 from interfaces.cli.lab import lab
 from interfaces.cli.link import link
 from interfaces.cli.middleware import middleware
+from interfaces.cli.options import option
 from interfaces.cli.replay import replay
 from interfaces.cli.reproduce import reproduce
 from interfaces.cli.robot import robot
@@ -66,7 +67,7 @@ def _version(value: bool) -> None:
 @app.callback()
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+        bool, option("--version", "Show the version and exit.", callback=_version, is_eager=True)
     ] = False,
 ) -> None:
     """An internet-teleoperation laboratory: virtual and simulated real robots on one timeline."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from interfaces.cli.options import option
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -25,18 +26,12 @@ def _root() -> None:
 
 @middleware.command(short_help="Train it, and test it against the exact gain")
 def train(
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where the network goes, as JSON.")],
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of the weights to begin with.")
-    ] = 0,
-    epsilon: Annotated[
-        float, typer.Option("--epsilon", min=1e-6, max=3, metavar="E", help="Tolerance of the measure J.")
-    ] = 0.25,
-    neurons: Annotated[int, typer.Option("--neurons", min=1, max=1000, metavar="N", help="Hidden ones.")] = 20,
-    epochs: Annotated[
-        int, typer.Option("--epochs", min=1, max=100_000, metavar="N", help="Most steps of training.")
-    ] = 2000,
-    as_json: Annotated[bool, typer.Option("--json", help="Write what was found on standard output.")] = False,
+    out: Annotated[Path, option("FILE", "Where the network goes, as JSON.")],
+    seed: Annotated[int, option("N", "Seed of the weights to begin with.", min=0, max=2**32 - 1)] = 0,
+    epsilon: Annotated[float, option("E", "Tolerance of the measure J.", min=1e-6, max=3)] = 0.25,
+    neurons: Annotated[int, option("N", "Hidden ones.", min=1, max=1000)] = 20,
+    epochs: Annotated[int, option("N", "Most steps of training.", min=1, max=100_000)] = 2000,
+    as_json: Annotated[bool, option("--json", "Write what was found on standard output.")] = False,
 ) -> None:
     """Train the network that says how fast a robot may go, and test it against the exact gain."""
     from interfaces.middleware import TrainingConfig

@@ -11,7 +11,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
@@ -30,103 +30,96 @@ if TYPE_CHECKING:
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
 
+
+def option(spelled: str, text: str, **more: Any) -> Any:
+    """An option of a command, for the annotation of its parameter.
+
+    Args:
+        spelled: What it takes, as `S` or `NAME|FILE`, where the parameter's name is the flag's; else `--flag S`, or
+            `--flag` alone where it takes nothing.
+        text: What it's for, as help says it.
+        **more: What else `typer.Option` takes, such as `min` and `max`.
+    """
+    *flags, metavar = spelled.split(" ") if " " in spelled or not spelled.startswith("--") else (spelled, None)
+    return typer.Option(*flags, metavar=metavar, help=text, **more)
+
+
+def argument(name: str, text: str) -> Any:
+    """An argument of a command, for its annotation: what it's called, and what it's for."""
+    return typer.Argument(metavar=name, help=text)
+
+
 PROFILES = (
     "none, constant:S, domain, country, mon, tue, wed, thu, fri, lunar, gamma:MEAN,SD[,MIN], "
     "route:DISTANCE,NODES,ROUTING,LOAD,BANDWIDTH or trace:FILE.csv; thu@20 for a correlation time of 20 s."
 )
 """What a delay may be."""
 
-Delay: TypeAlias = Annotated[str, typer.Option("--delay", metavar="PROFILE", help=PROFILES)]
+Delay: TypeAlias = Annotated[str, option("--delay PROFILE", PROFILES)]
 Offset: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--offset",
-        metavar="OFFSET",
-        help="How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
+    option(
+        "--offset OFFSET",
+        "How far the real robot plays behind: adaptive, fixed (the profile's 95 % quantile) or fixed:S.",
     ),
 ]
-Order: TypeAlias = Annotated[
-    str, typer.Option("--service", metavar="ORDER", help="Delivery on the link: datagram or in-order.")
-]
-Out: TypeAlias = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Where report.html, summary.json and run.mcap go.")
-]
+Order: TypeAlias = Annotated[str, option("--service ORDER", "Delivery on the link: datagram or in-order.")]
+Out: TypeAlias = Annotated[Path, option("--out DIR", "Where report.html, summary.json and run.mcap go.")]
 DialectName: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--dialect",
-        metavar="val2|vplus",
-        help="Angles of files that don't say: val2's O, A, T (unless given), or vplus's yaw, pitch, roll.",
+    option(
+        "--dialect val2|vplus",
+        "Angles of files that don't say: val2's O, A, T (unless given), or vplus's yaw, pitch, roll.",
     ),
 ]
 VAL_JOINTS = 6
 """Joints that VAL-II's places have."""
 RobotName: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--robot",
-        metavar="NAME|MODULE:NAME",
-        help=f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own.",
-    ),
+    option("--robot NAME|MODULE:NAME", f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own."),
 ]
 RecordedRobot: TypeAlias = Annotated[
-    str | None,
-    typer.Option(
-        "--robot",
-        metavar="NAME|MODULE:NAME",
-        help="The robot that it's of, unless its name is known.",
-    ),
+    str | None, option("--robot NAME|MODULE:NAME", "The robot that it's of, unless its name is known.")
 ]
 BodyName: TypeAlias = Annotated[
-    str, typer.Option("--body", metavar="BODY", help="What is real of an arm: bullet, ideal or another of its own.")
+    str, option("--body BODY", "What is real of an arm: bullet, ideal or another of its own.")
 ]
 ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
 """Unless others are asked for."""
 Architecture: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--architecture",
-        metavar="NAME",
-        help="Of a mobile robot, what it does with the operator's path: I, II, III, III-capped, extended, "
+    option(
+        "--architecture NAME",
+        "Of a mobile robot, what it does with the operator's path: I, II, III, III-capped, extended, "
         "timeline, or MODULE:NAME of your own.",
     ),
 ]
 RoomName: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--room",
-        metavar="NAME|FILE",
-        help="Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file.",
-    ),
+    option("--room NAME|FILE", "Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file."),
 ]
 OperatorLossName: TypeAlias = Annotated[
     str,
-    typer.Option(
-        "--operator-loss",
-        metavar="POLICY",
-        help="Of a mobile robot, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
+    option(
+        "--operator-loss POLICY",
+        "Of a mobile robot, what becomes of its goals and jobs when the operator is lost: stop or carry-on.",
     ),
 ]
 Host: TypeAlias = Annotated[
-    str,
-    typer.Option("--host", metavar="HOST", help="Address to listen on; off loopback with --token-file only."),
+    str, option("--host HOST", "Address to listen on; off loopback with --token-file only.")
 ]
-Port: TypeAlias = Annotated[
-    int, typer.Option("--port", min=0, max=65535, metavar="N", help="0 for any that's free.")
-]
-
-
+Port: TypeAlias = Annotated[int, option("--port N", "0 for any that's free.", min=0, max=65535)]
+Seed: TypeAlias = Annotated[int, option("--seed N", "Seed of everything random.", min=0)]
+Workers: TypeAlias = Annotated[int, option("--workers N", "Processes at once; changes no figure.", min=1, max=64)]
 TokenFile: TypeAlias = Annotated[
-    Path | None,
-    typer.Option("--token-file", metavar="FILE", help="Tokens; needed off loopback. Made if it's missing."),
+    Path | None, option("--token-file FILE", "Tokens; needed off loopback. Made if it's missing.")
 ]
 """What lets other machines in: see `access_for`."""
 ReachedAs: TypeAlias = Annotated[
     list[str] | None,
-    typer.Option(
-        "--reached-as",
-        metavar="HOST[:PORT]",
-        help="Another address that it's reached by, as behind a forwarded port or a proxy; may be repeated.",
+    option(
+        "--reached-as HOST[:PORT]",
+        "Another address that it's reached by, as behind a forwarded port or a proxy; may be repeated.",
     ),
 ]
 """What else requests may ask for: see `asked_for`."""
@@ -255,6 +248,22 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
+    """The tokens of a file, which is made if it's missing; None without one, where only this machine comes in.
+
+    Raises:
+        InvalidValueError: If other machines would come in without tokens.
+        FormatError: If the file can't be used.
+    """
+    from interfaces.stream.access import make_tokens, read_tokens
+
+    if token_file is None:
+        if not is_loopback(host):
+            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
+        return None
+    return read_tokens(token_file) if token_file.exists() else make_tokens(token_file)
+
+
 def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
     """Who may come in: with a token file whoever has a token, without one whoever is on this machine.
 
@@ -267,13 +276,10 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
         InvalidValueError: If other machines would come in without tokens.
         FormatError: If the file can't be used.
     """
-    from interfaces.stream.access import Access, make_tokens, read_tokens
+    from interfaces.stream.access import Access
 
-    if token_file is None:
-        if not is_loopback(host):
-            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
-        return Access(free=free)
-    return Access(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), free=())
+    tokens = tokens_for(host, token_file)
+    return Access(free=free) if tokens is None else Access(tokens, free=())
 
 
 def names_of(host: str) -> list[str]:

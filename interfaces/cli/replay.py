@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -16,8 +16,10 @@ from interfaces.cli.options import (
     RecordedRobot,
     TokenFile,
     access_for,
+    argument,
     asked_for,
     end_on_signal,
+    option,
     recorded_robot,
 )
 from vrs.checks import one_of
@@ -38,37 +40,20 @@ RERUN = ("identical", "commands", "versions", "difference", "missing")
 
 
 def replay(
-    run: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A recording.")],
-    other: Annotated[
-        Path | None, typer.Argument(metavar="OTHER.mcap", help="Another one, shown beside it.")
-    ] = None,
-    at: Annotated[
-        float | None,
-        typer.Option("--at", metavar="T", help="Where to begin [s]; alone with --headless: that instant."),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option("--rate", metavar="R", help="−8 to 8, but not 0; negative rewinds. 1 by default."),
-    ] = None,
-    loop: Annotated[str | None, typer.Option("--loop", metavar="A:B", help="Loop from A to B [s].")] = None,
+    run: Annotated[Path, argument("RUN.mcap", "A recording.")],
+    other: Annotated[Path | None, argument("OTHER.mcap", "Another one, shown beside it.")] = None,
+    at: Annotated[float | None, option("T", "Where to begin [s]; alone with --headless: that instant.")] = None,
+    rate: Annotated[float | None, option("R", "−8 to 8, but not 0; negative rewinds. 1 by default.")] = None,
+    loop: Annotated[str | None, option("A:B", "Loop from A to B [s].")] = None,
     align: Annotated[
         str,
-        typer.Option(
-            "--align",
-            metavar="CLOCK",
-            help="Of two recordings: timeline, start (their beginnings) or began (the calendar).",
-        ),
+        option("CLOCK", "Of two recordings: timeline, start (their beginnings) or began (the calendar)."),
     ] = "timeline",
-    headless: Annotated[
-        bool, typer.Option("--headless", help="Frames as lines, at their time, instead of a page.")
-    ] = False,
-    frames: Annotated[
-        float, typer.Option("--frames", metavar="HZ", help="Frames a second of your time, with --headless.")
-    ] = 30.0,
-    as_json: Annotated[bool, typer.Option("--json", help="With --headless or --commands: JSON lines.")] = False,
+    headless: Annotated[bool, option("--headless", "Frames as lines, at their time, instead of a page.")] = False,
+    frames: Annotated[float, option("HZ", "Frames a second of your time, with --headless.")] = 30.0,
+    as_json: Annotated[bool, option("--json", "With --headless or --commands: JSON lines.")] = False,
     commands: Annotated[
-        bool,
-        typer.Option("--commands", help="Run the commands again on a fresh engine: is the timeline the same?"),
+        bool, option("--commands", "Run the commands again on a fresh engine: is the timeline the same?")
     ] = False,
     name: RecordedRobot = None,
     host: Host = "127.0.0.1",
@@ -83,7 +68,7 @@ def replay(
     from interfaces.recording.playback import Align, Playback, checked_rate
     from interfaces.recording.recording import open_recording
 
-    span = None if loop is None else _range(loop)
+    start = PlaybackStart(at, rate, None if loop is None else _range(loop))
     if rate is not None:
         checked_rate(rate)
     if not FEWEST <= frames <= MOST:
@@ -104,9 +89,9 @@ def replay(
             return _run_again(recordings, as_json)
         playback = Playback(recordings, align=aligned)
         if headless:
-            _print(playback, at, rate, span, frames, as_json)
+            _print(playback, start, frames, as_json)
         else:
-            _serve(playback, at, rate, span, access, allowed, host, port)
+            _serve(playback, start, access, allowed, host, port)
     return 0
 
 
@@ -129,52 +114,41 @@ def _warn(recording: Recording) -> None:
         typer.echo(f"vrs: {recording.path}: {recording.damage}{unless}", err=True)
 
 
-def begin(
-    playback: Playback, at: float | None, rate: float | None, span: tuple[float, float] | None, *, now: float
-) -> None:
-    """Go where play-back begins, and play there.
+class PlaybackStart(NamedTuple):
+    """Where and how play-back begins, as far as it's said."""
 
-    Args:
-        playback: Standing.
-        at: Where [s]; None for the start, or what `rate` and `span` ask for.
-        rate: How fast; None for 1.
-        span: What is looped [s].
-        now: The user's time [s].
-    """
-    if at is not None:
-        playback.seek(at, now=now)
-    playback.play(now=now, rate=1.0 if rate is None else rate)
-    if span is not None:
-        playback.set_loop(*span, now=now)
+    at: float | None = None
+    """Where [s]; None for the start, or what `rate` and `span` ask for."""
+    rate: float | None = None
+    """How fast; None for 1."""
+    span: tuple[float, float] | None = None
+    """What is looped [s]."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether only the instant is given, at which it stands then."""
+        return self.at is not None and self.rate is None and self.span is None
 
 
-def begin_shown(
-    playback: Playback, at: float | None, rate: float | None, span: tuple[float, float] | None, *, now: float
-) -> None:
-    """Begin when the first page looks: where only `at` is given it stands there; what is being written is live.
+def begin(playback: Playback, start: PlaybackStart, *, now: float) -> None:
+    """Go where standing play-back begins, and play there, at the user's time now [s]."""
+    if start.at is not None:
+        playback.seek(start.at, now=now)
+    playback.play(now=now, rate=1.0 if start.rate is None else start.rate)
+    if start.span is not None:
+        playback.set_loop(*start.span, now=now)
 
-    Args:
-        playback: Standing at `at`, if that is given.
-        at: As for `begin`.
-        rate: As for `begin`.
-        span: As for `begin`.
-        now: The user's time [s].
-    """
-    if playback.growing and (at, rate, span) == (None, None, None):
+
+def begin_shown(playback: Playback, start: PlaybackStart, *, now: float) -> None:
+    """Begin when the first page looks: what is to stand is there already; what is being written is live."""
+    if playback.growing and start == PlaybackStart():
         playback.seek(playback.span[1], now=now)
         playback.go_live(now=now)
-    elif at is None or rate is not None or span is not None:
-        begin(playback, at, rate, span, now=now)
+    elif not start.stands:
+        begin(playback, start, now=now)
 
 
-def _print(
-    playback: Playback,
-    at: float | None,
-    rate: float | None,
-    span: tuple[float, float] | None,
-    frames: float,
-    as_json: bool,
-) -> None:
+def _print(playback: Playback, start: PlaybackStart, frames: float, as_json: bool) -> None:
     import asyncio
 
     from interfaces.recording.headless import PlaybackFrames, lines, play
@@ -185,8 +159,8 @@ def _print(
         sys.stdout.flush()
 
     playback.read_marks()
-    if at is not None and rate is None and span is None:
-        playback.seek(at, now=0.0)
+    if start.at is not None and start.stands:
+        playback.seek(start.at, now=0.0)
         found = PlaybackFrames(playback, rate=frames, begun=0.0).next(now=0.0)
         assert found is not None
         for line in lines(*found, as_json=as_json):
@@ -197,22 +171,13 @@ def _print(
         clock, ended = WallClock(), asyncio.Event()
         end_on_signal(ended)
         now = clock.now()
-        begin(playback, at, rate, span, now=now)
+        begin(playback, start, now=now)
         await play(PlaybackFrames(playback, rate=frames, begun=now), clock, say, ended, as_json=as_json)
 
     asyncio.run(printed())
 
 
-def _serve(
-    playback: Playback,
-    at: float | None,
-    rate: float | None,
-    span: tuple[float, float] | None,
-    access: Access,
-    allowed: Hosts,
-    host: str,
-    port: int,
-) -> None:
+def _serve(playback: Playback, start: PlaybackStart, access: Access, allowed: Hosts, host: str, port: int) -> None:
     import asyncio
 
     from interfaces.link.proxy import Address
@@ -229,10 +194,10 @@ def _serve(
         clock = WallClock()
 
         def first(now: float) -> None:
-            begin_shown(playback, at, rate, span, now=now)
+            begin_shown(playback, start, now=now)
 
-        if at is not None:
-            playback.seek(at, now=clock.now())
+        if start.at is not None:
+            playback.seek(start.at, now=clock.now())
         page = ReplayPage(
             playback, clock, authorize=lambda token: not access.refusal(Role.VIEWER, token), first=first
         )

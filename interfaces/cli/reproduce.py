@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
+from interfaces.cli.options import Workers, argument, option
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
@@ -16,46 +17,34 @@ if TYPE_CHECKING:
 
 def reproduce(
     paper: Annotated[
-        str,
-        typer.Argument(
-            metavar="PAPER", help="doulgeri, han2001, kim2002, kim2006, tipsuwan, or all for every paper."
-        ),
+        str, argument("PAPER", "doulgeri, han2001, kim2002, kim2006, tipsuwan, or all for every paper.")
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where PAPER.json and the figures go.")],
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**32 - 1, metavar="N", help="Seed of everything random.")
-    ] = 0,
+    out: Annotated[Path, option("DIR", "Where PAPER.json and the figures go.")],
+    seed: Annotated[int, option("N", "Seed of everything random.", min=0, max=2**32 - 1)] = 0,
     runs: Annotated[
-        int | None,
-        typer.Option(
-            "--runs", min=2, max=1000, metavar="K", help="Runs behind each random figure; 10 unless given."
-        ),
+        int | None, option("K", "Runs behind each random figure; 10 unless given.", min=2, max=1000)
     ] = None,
     length: Annotated[
         float | None,
-        typer.Option(
-            "--length",
+        option(
+            "S",
+            "Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001, 30 for kim2006, 15 for "
+            "tipsuwan.",
             min=2,
             max=3600,
-            metavar="S",
-            help="Commands in each run last so long [s]; 20 for doulgeri, 120 for han2001, 30 for kim2006, 15 for "
-            "tipsuwan.",
         ),
     ] = None,
     beyond: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--beyond",
-            metavar="FILE",
-            help="What is claimed beyond the papers, for the page: benchmarks/results.json, or the summary.json of "
+        option(
+            "FILE",
+            "What is claimed beyond the papers, for the page: benchmarks/results.json, or the summary.json of "
             "vrs lab localization; repeatable.",
         ),
     ] = None,
-    workers: Annotated[
-        int, typer.Option("--workers", min=1, max=64, metavar="N", help="Processes at once; changes no figure.")
-    ] = 2,
+    workers: Workers = 2,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Write PAPER.json on standard output too, a document a paper.")
+        bool, option("--json", "Write PAPER.json on standard output too, a document a paper.")
     ] = False,
 ) -> None:
     """Measure each claim of a paper: expected, measured, holds; with figures, and all claims on one page."""

@@ -28,11 +28,12 @@ from interfaces.cli.options import (
     check_taken,
     end_on_signal,
     end_with_input,
-    is_loopback,
     keep_quiet,
     left_out,
+    option,
     room_of,
     saying_policy,
+    tokens_for,
 )
 from interfaces.system import software
 from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
@@ -72,7 +73,7 @@ def thin_client(
     import uvloop
 
     from interfaces.link.proxy import parse_address
-    from interfaces.rsp.live import bind
+    from interfaces.rsp.live import bind, keys_of
     from interfaces.rsp.model import read_model
 
     where = parse_address("--rsp", address)
@@ -81,23 +82,17 @@ def thin_client(
     if device is None:
         raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
     robot = read_model(device.model if model is None else model)
-    keys = _keys(where.host, token_file)
+    tokens = tokens_for(where.host, token_file)
+    keys = None if tokens is None else keys_of(tokens, token_file)
     sock = bind(where.host, where.port)
-    problem = uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof))
+    _end(uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof)))
+
+
+def _end(problem: str) -> None:
+    """Say what failed, if anything did, and exit with it."""
     if problem:
         typer.echo(f"vrs: {problem}", err=True)
         raise typer.Exit(1)
-
-
-def _keys(host: str, token_file: Path | None) -> Keyring | None:
-    from interfaces.rsp.live import keys_of
-    from interfaces.stream.access import make_tokens, read_tokens
-
-    if token_file is None:
-        if not is_loopback(host):
-            raise InvalidValueError("host", host, "127.0.0.1 or localhost, unless a --token-file is given")
-        return None
-    return keys_of(read_tokens(token_file) if token_file.exists() else make_tokens(token_file), token_file)
 
 
 async def _serve_rsp(
@@ -148,67 +143,45 @@ POSE = "nominal"
 def robot(
     ctx: typer.Context,
     rsp: Annotated[
-        str | None,
-        typer.Option(
-            "--rsp",
-            metavar="HOST:PORT",
-            help="Be a thin client instead, that is driven by RSP over UDP here.",
-        ),
+        str | None, option("HOST:PORT", "Be a thin client instead, that is driven by RSP over UDP here.")
     ] = None,
     rsp_model: Annotated[
-        Path | None,
-        typer.Option("--model", metavar="FILE.xmi", help="With --rsp: another robot model than its own."),
+        Path | None, option("--model FILE.xmi", "With --rsp: another robot model than its own.")
     ] = None,
     listen: Annotated[
-        str,
-        typer.Option("--listen", metavar="HOST:PORT", help="Where an operator's site connects; port 0 for any."),
+        str, option("HOST:PORT", "Where an operator's site connects; port 0 for any.")
     ] = "127.0.0.1:8601",
     name: RobotName = USUAL,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
-        str,
-        typer.Option(
-            "--offset", metavar="OFFSET", help="How far behind the operator it plays: adaptive or fixed:S."
-        ),
+        str, option("OFFSET", "How far behind the operator it plays: adaptive or fixed:S.")
     ] = "adaptive",
     link_loss: Annotated[
         str,
-        typer.Option(
-            "--link-loss",
-            metavar="POLICY",
-            help="Unless the operator's site says otherwise. halt: stop when nothing fresh comes for "
+        option(
+            "POLICY",
+            "Unless the operator's site says otherwise. halt: stop when nothing fresh comes for "
             "--timeout, and wait for a resume; hold: wait and go on.",
         ),
     ] = "halt",
     operator_loss: OperatorLossName = OPERATOR_LOSS,
-    timeout: Annotated[
-        float, typer.Option("--timeout", metavar="S", help="T_loss under halt [s], 0.1 to 2.")
-    ] = 0.5,
+    timeout: Annotated[float, option("S", "T_loss under halt [s], 0.1 to 2.")] = 0.5,
     max_age: Annotated[
         float,
-        typer.Option(
-            "--max-age",
-            metavar="S",
-            help="Oldest message that counts under halt [s], 0.01 to 2; doubt about the clocks is added.",
-        ),
+        option("S", "Oldest message that counts under halt [s], 0.01 to 2; doubt about the clocks is added."),
     ] = 0.5,
     lead: Annotated[
-        float,
-        typer.Option(
-            "--lead", metavar="S", help="How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay."
-        ),
+        float, option("S", "How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay.")
     ] = 0.05,
     body: BodyName = "",
-    friction: Annotated[bool, typer.Option("--friction/--no-friction", help="Friction in its joints.")] = True,
-    pose: Annotated[str, typer.Option("--pose", metavar="NAME", help="Named pose to begin in.")] = POSE,
-    reports: Annotated[
-        float, typer.Option("--reports", metavar="N", help="How often it says where it is [1/s], 1 to 200.")
-    ] = 30.0,
+    friction: Annotated[bool, option("--friction/--no-friction", "Friction in its joints.")] = True,
+    pose: Annotated[str, option("NAME", "Named pose to begin in.")] = POSE,
+    reports: Annotated[float, option("N", "How often it says where it is [1/s], 1 to 200.")] = 30.0,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
     until_eof: Annotated[
-        bool, typer.Option("--until-eof", help="End when standard input does, once the robot rests.")
+        bool, option("--until-eof", "End when standard input does, once the robot rests.")
     ] = False,
 ) -> None:
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
@@ -272,10 +245,7 @@ def robot(
         says = f"{made.name}, {kind}", remark
         return await _serve(LiveRobot(made, access, server=software()), says, address, allowed, until_eof=until_eof)
 
-    problem = uvloop.run(main())
-    if problem:
-        typer.echo(f"vrs: {problem}", err=True)
-        raise typer.Exit(1)
+    _end(uvloop.run(main()))
 
 
 def _offset(text: str) -> float | None:

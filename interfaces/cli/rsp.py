@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from interfaces.cli.options import argument, option
+
 if TYPE_CHECKING:
     from interfaces.rsp.model import Element, RobotModel
 
@@ -15,8 +17,8 @@ rsp = typer.Typer(name="rsp", rich_markup_mode=None)
 model = typer.Typer(name="model", rich_markup_mode=None)
 rsp.add_typer(model, help="Robot models: new, show, check.")
 
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.xmi", help="A robot model.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Write it as JSON on standard output.")]
+ModelFile = Annotated[Path, argument("MODEL.xmi", "A robot model.")]
+AsJson = Annotated[bool, option("--json", "Write it as JSON on standard output.")]
 
 
 @rsp.callback()
@@ -26,9 +28,9 @@ def _rsp() -> None:
 
 @model.command()
 def new(
-    file: Annotated[Path, typer.Argument(metavar="MODEL.xmi", help="Where it goes; nothing may be there.")],
-    name: Annotated[str, typer.Option("--name", metavar="NAME", help="Of the robot: a to z, digits, _.")] = "rover",
-    model_id: Annotated[int, typer.Option("--id", metavar="N", help="Model ID, 0 to 65535.")] = 1,
+    file: Annotated[Path, argument("MODEL.xmi", "Where it goes; nothing may be there.")],
+    name: Annotated[str, option("NAME", "Of the robot: a to z, digits, _.")] = "rover",
+    model_id: Annotated[int, option("--id N", "Model ID, 0 to 65535.")] = 1,
 ) -> None:
     """Write a small model with one element of each kind, to begin with."""
     from interfaces.rsp.model import example, write_model
@@ -79,12 +81,7 @@ def check(file: ModelFile, as_json: AsJson = False) -> None:
 @rsp.command(short_help="A robot's middleware and packet handlers, as a Python package")
 def generate(
     file: ModelFile,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="DIR", help="Where the package goes, by the model's name; here unless given."
-        ),
-    ] = Path(),
+    out: Annotated[Path, option("DIR", "Where the package goes, by the model's name; here unless given.")] = Path(),
     as_json: AsJson = False,
 ) -> None:
     """Write the middleware and the packet handlers of a robot, as a typed Python package."""

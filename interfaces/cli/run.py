@@ -20,7 +20,18 @@ from interfaces.cli.demo import (
     show,
     write,
 )
-from interfaces.cli.options import Delay, DialectName, Offset, Order, Out, RobotName, dialect_of, val_robot
+from interfaces.cli.options import (
+    Delay,
+    DialectName,
+    Offset,
+    Order,
+    Out,
+    RobotName,
+    argument,
+    dialect_of,
+    option,
+    val_robot,
+)
 from interfaces.system import read_within
 from robots.robot import USUAL
 
@@ -32,24 +43,16 @@ MAX_BYTES = 4 * 1024 * 1024
 
 
 def run(
-    programs: Annotated[
-        list[Path], typer.Argument(metavar="PROGRAM.v2", help="Files of VAL-II programs and values.")
-    ],
-    program: Annotated[
-        str, typer.Option("--program", metavar="NAME", help="Which program is run; the first unless given.")
-    ] = "",
+    programs: Annotated[list[Path], argument("PROGRAM.v2", "Files of VAL-II programs and values.")],
+    program: Annotated[str, option("NAME", "Which program is run; the first unless given.")] = "",
     name: RobotName = USUAL,
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random, RANDOM too.")
-    ] = DEFAULT_SEED,
+    seed: Annotated[int, option("N", "Seed of everything random, RANDOM too.", min=0)] = DEFAULT_SEED,
     dialect: DialectName = "",
     out: Out = Path("out"),
-    limit: Annotated[
-        float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
-    ] = 600.0,
+    limit: Annotated[float, option("S", "When the program is given up [s].", min=1, max=3600)] = 600.0,
 ) -> None:
     """Run a program of files, once, on virtual and real robot across an emulated internet.
 

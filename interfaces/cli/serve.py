@@ -34,6 +34,7 @@ from interfaces.cli.options import (
     end_with_input,
     keep_quiet,
     left_out,
+    option,
     room_of,
     say_lost,
     say_robot,
@@ -66,88 +67,60 @@ def serve(
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     camera: Annotated[
-        float,
-        typer.Option(
-            "--camera", metavar="RATE", help="Pictures a second of a robot's camera, 1 to 30; 0 for no camera."
-        ),
+        float, option("RATE", "Pictures a second of a robot's camera, 1 to 30; 0 for no camera.")
     ] = 6.0,
-    delay: Annotated[
-        str,
-        typer.Option(
-            "--delay",
-            metavar="PROFILE",
-            help=f"Emulated on the way to the robot: {PROFILES}",
-        ),
-    ] = "none",
-    loss: Annotated[
-        str, typer.Option("--loss", metavar="P", help="Emulated loss: a probability, or as vrs link takes it.")
-    ] = "0",
-    service: Annotated[
-        str, typer.Option("--service", metavar="ORDER", help="Emulated delivery: datagram or in-order.")
-    ] = "datagram",
-    seed: Annotated[int, typer.Option("--seed", min=0, metavar="N", help="Seed of the emulated link.")] = 0,
+    delay: Annotated[str, option("PROFILE", f"Emulated on the way to the robot: {PROFILES}")] = "none",
+    loss: Annotated[str, option("P", "Emulated loss: a probability, or as vrs link takes it.")] = "0",
+    service: Annotated[str, option("ORDER", "Emulated delivery: datagram or in-order.")] = "datagram",
+    seed: Annotated[int, option("N", "Seed of the emulated link.", min=0)] = 0,
     offset: Annotated[
         str,
-        typer.Option(
-            "--offset",
-            metavar="OFFSET",
-            help="How far the robot that this starts plays behind: adaptive, fixed (from the profile) or fixed:S.",
+        option(
+            "OFFSET",
+            "How far the robot that this starts plays behind: adaptive, fixed (from the profile) or fixed:S.",
         ),
     ] = "adaptive",
     link_loss: Annotated[
         str | None,
-        typer.Option(
-            "--link-loss",
-            metavar="POLICY",
-            help="What the robot does when nothing fresh comes: halt (it stops, and waits for a resume) or hold "
+        option(
+            "POLICY",
+            "What the robot does when nothing fresh comes: halt (it stops, and waits for a resume) or hold "
             "(it waits, and goes on). Unless given, hold where --delay is too slow for halt; else halt, or what "
             "the robot at --robot-at was started with.",
         ),
     ] = None,
     operator_loss: OperatorLossName = OPERATOR_LOSS,
-    jobs: Annotated[
-        Path, typer.Option("--jobs", metavar="FILE.json", help="Of a mobile robot, where the list of jobs is kept.")
-    ] = Path("jobs.json"),
+    jobs: Annotated[Path, option("FILE.json", "Of a mobile robot, where the list of jobs is kept.")] = Path(
+        "jobs.json"
+    ),
     max_age: Annotated[
         float,
-        typer.Option(
-            "--max-age",
-            metavar="S",
-            help="Of the robot that this starts: oldest message that counts under halt [s], 0.01 to 2.",
-        ),
+        option("S", "Of the robot that this starts: oldest message that counts under halt [s], 0.01 to 2."),
     ] = 0.5,
     body: BodyName = "",
     robot_at: Annotated[
-        str | None,
-        typer.Option("--robot-at", metavar="HOST:PORT", help="Where vrs robot listens; without it one is started."),
+        str | None, option("HOST:PORT", "Where vrs robot listens; without it one is started.")
     ] = None,
-    robot_token_file: Annotated[
-        Path | None, typer.Option("--robot-token-file", metavar="FILE", help="Token file of that robot.")
-    ] = None,
+    robot_token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
     val_port: Annotated[
         int | None,
-        typer.Option(
-            "--val-port",
+        option(
+            "N",
+            "VAL-II's monitor on plain TCP, on loopback only, by a token; 0 for any port that's free.",
             min=0,
             max=65535,
-            metavar="N",
-            help="VAL-II's monitor on plain TCP, on loopback only, by a token; 0 for any port that's free.",
         ),
     ] = None,
-    val_files: Annotated[
-        Path, typer.Option("--val-files", metavar="DIR", help="Where the LOAD and STORE of VAL-II find files.")
-    ] = Path(),
+    val_files: Annotated[Path, option("DIR", "Where the LOAD and STORE of VAL-II find files.")] = Path(),
     record: Annotated[
-        Path | None,
-        typer.Option("--record", metavar="FILE.mcap", help="Record everything; vrs replay and compare read it."),
+        Path | None, option("FILE.mcap", "Record everything; vrs replay and compare read it.")
     ] = None,
-    recordings: Annotated[
-        Path,
-        typer.Option("--recordings", metavar="DIR", help="Where the station records to; made when it's needed."),
-    ] = Path("recordings"),
-    until_eof: Annotated[bool, typer.Option("--until-eof", help="End when standard input does.")] = False,
+    recordings: Annotated[Path, option("DIR", "Where the station records to; made when it's needed.")] = Path(
+        "recordings"
+    ),
+    until_eof: Annotated[bool, option("--until-eof", "End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     import uvloop

@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from interfaces.engine_server.site import Site, earliest
 from interfaces.link.delivery import Resending
-from interfaces.link.link import Direction
+from interfaces.link.link import Channel
 from interfaces.messages import Reply, Request
 from vrs.engine import Engine
 
@@ -179,7 +179,7 @@ class MemoryTransport:
     """
 
     def __init__(
-        self, site: Site, forward: Direction[Any], backward: Direction[Any], *, lead: float = 0.0, most: int = 256
+        self, site: Site, forward: Channel[Any], backward: Channel[Any], *, lead: float = 0.0, most: int = 256
     ) -> None:
         self.port = RemotePort()
         self.servlet = site.servlet(lead=lead)

@@ -1,13 +1,12 @@
 """Reproductions of papers: what each claims, measured by running it."""
 
-from interfaces.lab.claims import Claim, Figure, Findings, Paper, PaperPart, Reproduction, Study, Table
+from interfaces.lab.claims import Claim, Findings, Paper, PaperPart, Reproduction, Study, Table
 from interfaces.lab.papers import PAPERS, papers
 from interfaces.lab.runner import reproduce
 
 __all__ = [
     "PAPERS",
     "Claim",
-    "Figure",
     "Findings",
     "Paper",
     "PaperPart",

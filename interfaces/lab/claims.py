@@ -167,6 +167,11 @@ class Findings:
     """Claims about this machine's speed: they differ from run to run."""
 
 
+def _only(_study: Study, found: tuple[Findings, ...]) -> Findings:
+    """The findings of the only case."""
+    return found[0]
+
+
 @dataclass(frozen=True, slots=True)
 class PaperPart:
     """Something to be measured, in cases that don't depend on each other."""
@@ -174,19 +179,9 @@ class PaperPart:
     title: str
     work: Callable[[Study, str], Any]
     """Measures a case, perhaps in another process."""
-    conclude: Callable[[Study, tuple[Any, ...]], Findings]
-    """Makes findings of what was measured, a value a case."""
+    conclude: Callable[[Study, tuple[Any, ...]], Findings] = _only
+    """Makes findings of what was measured, a value a case; unless given, the only case makes them itself."""
     cases: tuple[str, ...] = ("",)
-
-    @classmethod
-    def single(cls, title: str, work: Callable[[Study, str], Findings]) -> PaperPart:
-        """A part whose one case makes the findings itself."""
-        return cls(title, work, _only)
-
-
-def _only(_study: Study, found: tuple[Findings, ...]) -> Findings:
-    """The findings of the only case."""
-    return found[0]
 
 
 @dataclass(frozen=True, slots=True)

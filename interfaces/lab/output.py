@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, interval_said, said
-from interfaces.runs.drive_run import DIGITS
+from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, Table, interval_said, said
+from interfaces.runs.drive_run import DIGITS, cell
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
     from rich.table import Table as RichTable
 
 INK: Final = "#1b2733"
@@ -29,13 +29,14 @@ WIDTH: Final = 7.2
 """Of a picture [inch]."""
 
 
-def draw(name: str, title: str, paint: Callable[[Canvas], None], *, height: float = 3.2) -> Figure:
+def draw(name: str, title: str, paint: Callable[..., None], *given: object, height: float = 3.2) -> Figure:
     """Paint a picture.
 
     Args:
         name: Of its file, without the ending.
         title: What it shows.
-        paint: Adds axes to the canvas, and draws in them.
+        paint: Adds axes to the canvas, its first argument, and draws in them.
+        *given: What else it takes.
         height: Its height [inch].
     """
     import matplotlib
@@ -71,7 +72,7 @@ def draw(name: str, title: str, paint: Callable[[Canvas], None], *, height: floa
     with matplotlib.rc_context(style):
         canvas = Canvas(figsize=(WIDTH, height), layout="constrained", facecolor="white")
         FigureCanvasSVG(canvas)
-        paint(canvas)
+        paint(canvas, *given)
         canvas.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
     return Figure(name, title, buffer.getvalue())
 
@@ -100,7 +101,7 @@ def to_json(reproduction: Reproduction) -> str:
                 "name": table.name,
                 "title": table.title,
                 "columns": list(table.columns),
-                "rows": [[_value(cell) for cell in row] for row in table.rows],
+                "rows": [list(map(_value, row)) for row in table.rows],
             }
             for table in found.tables
         ],
@@ -122,11 +123,11 @@ def _claim(claim: Claim) -> dict[str, Any]:
     }
 
 
-def _value(cell: Cell) -> Cell:
+def _value(given: Cell) -> Cell:
     """A number with as many digits as mean something; no infinity or NaN, which JSON hasn't got."""
-    if not isinstance(cell, float):
-        return cell
-    return float(f"{cell:.{DIGITS}g}") if math.isfinite(cell) else str(cell)
+    if not isinstance(given, float):
+        return given
+    return float(f"{given:.{DIGITS}g}") if math.isfinite(given) else str(given)
 
 
 def write(reproduction: Reproduction, out: Path) -> Path:
@@ -161,36 +162,43 @@ def write_files(out: Path, figures: Iterable[Figure], texts: Mapping[str, str]) 
         raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
 
 
+def write_runs(found: Reproduction, out: Path, tables: Sequence[Table]) -> None:
+    """Write summary.json, runs.csv with the rows of some tables, which have the same columns, and the pictures.
+
+    Raises:
+        FormatError: If the directory, which must exist, can't hold them.
+    """
+    lines = io.StringIO()
+    rows = csv.writer(lines, lineterminator="\n")
+    rows.writerow(tables[0].columns)
+    rows.writerows(map(cell, row) for table in tables for row in table.rows)
+    write_files(out, found.findings.figures, {"runs.csv": lines.getvalue(), "summary.json": to_json(found)})
+
+
 def rich_tables(reproduction: Reproduction) -> list[RichTable]:
     """The claims, a row a claim, then the other tables."""
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
     found = reproduction.findings
     made = []
     for title, claims in (("claims", found.claims), ("speed of this machine", found.timings)):
         if not claims:
             continue
-        table = Table(title=f"{reproduction.paper.name}: {title}", title_justify="left", show_lines=True)
-        for name, share in (
-            ("claim", 4),
-            ("source", 2),
-            ("expected", 2),
-            ("measured", 2),
-            ("interval", 2),
-            ("holds", 1),
-        ):
+        table = RichTable(title=f"{reproduction.paper.name}: {title}", title_justify="left", show_lines=True)
+        shares = {"claim": 4, "source": 2, "expected": 2, "measured": 2, "interval": 2, "holds": 1}
+        for name, share in shares.items():
             table.add_column(name, ratio=share, overflow="fold")
         for claim in claims:
             ends = interval_said(claim.interval)
             holds = "yes" if claim.holds else "[bold red]NO[/]"
-            cells = claim.claim, claim.source, said(claim.expected), said(claim.measured), ends
-            table.add_row(*(cell.replace("[", r"\[") for cell in cells), holds)
+            words = claim.claim, claim.source, said(claim.expected), said(claim.measured), ends
+            table.add_row(*(word.replace("[", r"\[") for word in words), holds)
         made.append(table)
     for plain in found.tables:
-        table = Table(title=plain.title.replace("[", r"\["), title_justify="left")
+        table = RichTable(title=plain.title.replace("[", r"\["), title_justify="left")
         for k, name in enumerate(plain.columns):
             table.add_column(name.replace("[", r"\["), justify="left" if k == 0 else "right")
         for row in plain.rows:
-            table.add_row(*(said(cell).replace("[", r"\[") for cell in row))
+            table.add_row(*(said(value).replace("[", r"\[") for value in row))
         made.append(table)
     return made

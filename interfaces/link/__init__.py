@@ -1,11 +1,10 @@
 """The emulated network between operator and robot."""
 
-from interfaces.link.clock_sync import ClockEstimate, ClockEvidence, ClockSync, ClockSyncConfig, DriftEstimate
-from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, PacketOutcome, Service
+from interfaces.link.clock_sync import ClockSync
+from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, Service
 from interfaces.link.delays import (
     ConstantDelay,
     DelayProfile,
-    DelaySource,
     GammaDelay,
     HeavyTailedDelay,
     Hop,
@@ -13,69 +12,44 @@ from interfaces.link.delays import (
     TraceDelay,
     delay_profile,
 )
-from interfaces.link.link import Channel, Delivery, Direction, Lane, Link, Stream, direction
-from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, LossModel, loss_model, spelled_loss
-from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord, Totals
-from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.link.link import Channel, Link
+from interfaces.link.losses import BernoulliLoss, GilbertElliottLoss, loss_model, spelled_loss
+from interfaces.link.packets import Gauge, LossReason, PacketLog, PacketRecord
 from interfaces.link.round_trip import (
-    DelayStatistics,
     Echo,
-    EchoRefusal,
-    LinkStatistics,
     Probe,
     ProbeConfig,
-    RelativeDelays,
     RoundTrip,
     RoundTripEstimator,
-    WindowConfig,
 )
 
 __all__ = [
     "BernoulliLoss",
     "Channel",
-    "ClockEstimate",
-    "ClockEvidence",
     "ClockSync",
-    "ClockSyncConfig",
     "Conditions",
     "ConstantDelay",
     "DelayProfile",
-    "DelaySource",
-    "DelayStatistics",
-    "Delivery",
-    "Direction",
-    "DriftEstimate",
     "Echo",
-    "EchoRefusal",
     "GammaDelay",
     "Gauge",
     "GilbertElliottLoss",
     "HeavyTailedDelay",
     "Hop",
-    "Lane",
     "Link",
     "LinkConditions",
     "LinkPath",
-    "LinkStatistics",
-    "LossModel",
     "LossReason",
     "PacketLog",
-    "PacketOutcome",
     "PacketRecord",
     "Probe",
     "ProbeConfig",
-    "RelativeDelays",
     "RoundTrip",
     "RoundTripEstimator",
     "RouteDelay",
     "Service",
-    "SlidingQuantiles",
-    "Stream",
-    "Totals",
     "TraceDelay",
-    "WindowConfig",
     "delay_profile",
-    "direction",
     "loss_model",
     "spelled_loss",
 ]

@@ -22,11 +22,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from interfaces.link.round_trip import RoundTrip
-from vrs.checks import at_least, finite, positive, validated, within
+from vrs.checks import at_least, finite, validated, within
 from vrs.errors import InvalidValueError
-
-_ANCHORS = 32
-"""Round trips kept to see the drift with: the tightest of each such part of the drift window."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +40,6 @@ class ClockSyncConfig:
     """Largest difference between the rate of mapped time and A's, as a share, in [0.001, 0.5]."""
     resolution: Annotated[float, at_least(0.0, "finite seconds ≥ 0")] = 1e-6
     """Largest error of rounding in one of B's stamps [s], ≥ 0."""
-    drift_window: Annotated[float, positive("finite seconds > 0")] = 600.0
-    """Time over which the drift is measured [s], > 0."""
     history: Annotated[int, within(2, 1_000_000)] = 1000
     """Corners of the map kept, in [2, 1,000,000]; earlier times are mapped with the oldest offset."""
 
@@ -80,20 +75,6 @@ class ClockEstimate:
     """A's time of sending the newest probe that a step would have shown in [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class DriftEstimate:
-    """Mean difference between B's rate and A's over a stretch of time."""
-
-    drift: float
-    """As a share: 1e-6 is B being fast by 1 ppm."""
-    uncertainty: float
-    """|error| ≤ uncertainty."""
-    start: float
-    """Begin of the stretch in A's clock [s]."""
-    end: float
-    """End of the stretch in A's clock [s]."""
-
-
 class ClockSync:
     """Follows the clock at the other end of a link.
 
@@ -106,10 +87,12 @@ class ClockSync:
         self._now = -math.inf
         self._bounds: _Bounds | None = None
         self._verified = self._settled = -math.inf
-        self._steps, self._step_count = 0.0, 0
+        self.steps = 0.0
+        """Sum of the steps of B's clock found so far [s]."""
+        self.step_count = 0
+        """How many steps of B's clock were found."""
         self._map: _Map | None = None
         self._heard = -math.inf
-        self._anchors: list[tuple[float, float, float]] = []
 
     def receive(self, trip: RoundTrip) -> ClockEvidence:
         """Take a round trip into account.
@@ -142,16 +125,14 @@ class ClockSync:
             self._bounds = known.narrowed(echo, t3)
         else:
             self._bounds = echo
-            self._anchors.clear()
         if t0 > self._verified or evidence is not ClockEvidence.TAKEN:
             self._verified, self._settled = t0, t3
         if evidence is ClockEvidence.STEP and self._map is not None:
-            self._steps = (high + low) / 2 - (self._map.remote(t3) - t3)
-            self._step_count += 1
-        self._anchor((t0 + t3) / 2, (t1 - t0 + t2 - t3) / 2, (high - low) / 2)
+            self.steps = (high + low) / 2 - (self._map.remote(t3) - t3)
+            self.step_count += 1
         if self._bounds is not known:
             low, high = self._bounds.at(t3)
-            aim = t3 + (high + low) / 2 - self._steps
+            aim = t3 + (high + low) / 2 - self.steps
             if self._map is None:
                 self._map = _Map(t3, aim, self.config.slew, self.config.history)
             else:
@@ -188,9 +169,9 @@ class ClockSync:
         self._present(now)
         if self._bounds is None or self._map is None:
             return math.inf
-        reading = self._map.remote(now) + self._steps
+        reading = self._map.remote(now) + self.steps
         low, high = self._bounds.at(now)
-        rounding = 2 * math.ulp(max(abs(reading), abs(now), abs(self._steps)))
+        rounding = 2 * math.ulp(max(abs(reading), abs(now), abs(self.steps)))
         return max(high - (reading - now), (reading - now) - low) + rounding
 
     def to_remote(self, t_local: float) -> float | None:
@@ -239,31 +220,7 @@ class ClockSync:
 
     def unstepped(self, stamp: float) -> float:
         """Time on B's timeline of a reading of B's clock [s], taken since the last step that was found."""
-        return finite("stamp", stamp, "finite seconds") - self._steps
-
-    @property
-    def steps(self) -> float:
-        """Sum of the steps of B's clock found so far [s]."""
-        return self._steps
-
-    @property
-    def step_count(self) -> int:
-        """How many steps of B's clock were found."""
-        return self._step_count
-
-    def drift(self) -> DriftEstimate | None:
-        """B's mean drift over the longest stretch that tells, since the last step; None until there are two ends.
-
-        A drift beyond `max_drift` by more than its uncertainty says that the bounds of this object don't hold.
-        """
-        if len(self._anchors) < 2:
-            return None
-        end, offset, half = self._anchors[-1]
-        width, start, drift = min(
-            ((half + half_i) / (end - t_i), t_i, (offset - offset_i) / (end - t_i))
-            for t_i, offset_i, half_i in self._anchors[:-1]
-        )
-        return DriftEstimate(drift, width, start, end)
+        return finite("stamp", stamp, "finite seconds") - self.steps
 
     def _judge(self, known: _Bounds, t0: float, low: float, high: float) -> ClockEvidence:
         lower, upper = known.at(self._now)
@@ -276,19 +233,6 @@ class ClockSync:
     def _present(self, now: float) -> None:
         if finite("now", now, "finite seconds") < self._now:
             raise InvalidValueError("now", now, f"at least {self._now}, the last arrival")
-
-    def _anchor(self, t: float, offset: float, half: float) -> None:
-        """Keep the tightest round trip of each period of the drift window."""
-        anchors = self._anchors
-        if not anchors or self._period(t) > self._period(anchors[-1][0]):
-            anchors.append((t, offset, half))
-            while t - anchors[0][0] > self.config.drift_window:
-                del anchors[0]
-        elif half < anchors[-1][2] and self._period(t) == self._period(anchors[-1][0]):
-            anchors[-1] = (t, offset, half)
-
-    def _period(self, t: float) -> int:
-        return math.floor(t / self.config.drift_window * _ANCHORS)
 
 
 class _Bounds:

@@ -58,7 +58,7 @@ class Conditions:
     capacity: Annotated[int, within(1, MAX_COUNT)] = 10_000
     """Most packets that a channel or stream holds, 1 to 10,000,000; what is sent beyond is lost."""
     service: Service = Service.DATAGRAM
-    """Order of delivery. In order means sent again until it arrives: see `Stream`."""
+    """Order of delivery. In order means sent again until it arrives: see `Channel`."""
     retransmit_after: float = 1.0
     """How long after a packet of an in-order service was lost it is sent again [s], in [0.001, 60]; twice as
     long after each further loss of the same packet, up to 60 s. RFC 6298's smallest."""

@@ -291,15 +291,7 @@ class RouteDelay:
 
     @classmethod
     def uniform(
-        cls,
-        name: str,
-        *,
-        distance: float,
-        nodes: int,
-        routing: float,
-        load: float,
-        bandwidth: float,
-        tau: float = CORRELATION_TIME,
+        cls, name: str, distance: float, nodes: int, routing: float, load: float, bandwidth: float, tau: float
     ) -> RouteDelay:
         """A route over equal nodes, in nodes + 1 equal links, as the sum from i = 0 to n counts them.
 
@@ -507,15 +499,8 @@ def _gamma(text: str, parts: list[str], tau: float) -> DelayProfile:
 
 def _route(text: str, parts: list[str], tau: float) -> DelayProfile:
     distance, nodes, routing, load, bandwidth = parts
-    return RouteDelay.uniform(
-        text,
-        distance=float(distance),
-        nodes=int(nodes),
-        routing=float(routing),
-        load=float(load),
-        bandwidth=float(bandwidth),
-        tau=tau,
-    )
+    numbers = float(routing), float(load), float(bandwidth)
+    return RouteDelay.uniform(text, float(distance), int(nodes), *numbers, tau)
 
 
 _PARAMETRIC: dict[str, Callable[[str, list[str], float], DelayProfile]] = {"gamma": _gamma, "route": _route}

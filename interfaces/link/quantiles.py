@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right, insort
+from bisect import bisect_left, insort
 from collections import deque
 
 from vrs.checks import finite, integer_in
@@ -12,8 +12,6 @@ from vrs.errors import InvalidValueError
 MAX_CAPACITY = 100_000
 LARGEST = 1e12
 """Largest magnitude of a value."""
-_BLOCK = 512
-"""Most values in a block: a memory move of 4 KiB costs less than one comparison in a tree of Python objects."""
 _FRACTION_BITS = 64
 _SCALE = 2.0**_FRACTION_BITS
 
@@ -21,8 +19,8 @@ _SCALE = 2.0**_FRACTION_BITS
 class SlidingQuantiles:
     """Order statistics of the newest values.
 
-    An update takes O(log n) comparisons. The mean comes from a fixed-point sum: what enters and leaves cancels
-    exactly, and nothing accumulates, however long it runs.
+    An update takes O(log n) comparisons, and moves a part of a sorted list. The mean comes from a fixed-point sum:
+    what enters and leaves cancels exactly, and nothing accumulates, however long it runs.
 
     Args:
         capacity: Most values kept, in [1, 100,000].
@@ -40,7 +38,8 @@ class SlidingQuantiles:
         self._capacity, self._horizon = capacity, horizon
         self._newest = -math.inf
         self._values: deque[tuple[float, float]] = deque()
-        self._ordered = _Ordered()
+        self._ordered: list[float] = []
+        """The same, ascending: to move a part of it costs less than a tree of Python objects would."""
         self._sum = 0
 
     def __len__(self) -> int:
@@ -66,13 +65,13 @@ class SlidingQuantiles:
         while values and (len(values) == self._capacity or now - values[0][0] >= self._horizon):
             self._forget(values.popleft()[1])
         values.append((now, value))
-        self._ordered.add(value)
+        insort(self._ordered, value)
         self._sum += int(value * _SCALE)
 
     def clear(self) -> None:
         """Forget every value, as when the clock that they were measured with has stepped."""
         self._values.clear()
-        self._ordered = _Ordered()
+        self._ordered.clear()
         self._sum = 0
 
     @property
@@ -93,7 +92,7 @@ class SlidingQuantiles:
     @property
     def maximum(self) -> float | None:
         """The largest value; None of an empty window."""
-        return self._ordered[len(self._values) - 1] if self._values else None
+        return self._ordered[-1] if self._values else None
 
     def quantile(self, share: float) -> float | None:
         """Value that the given share of the window doesn't exceed, linear between neighbours (as `numpy.quantile`).
@@ -123,49 +122,5 @@ class SlidingQuantiles:
         return low + (high - low) * rest if rest < 0.5 else high - (high - low) * (1 - rest)
 
     def _forget(self, value: float) -> None:
-        self._ordered.remove(value)
+        del self._ordered[bisect_left(self._ordered, value)]
         self._sum -= int(value * _SCALE)
-
-
-class _Ordered:
-    """Sorted numbers in blocks: a value is put in or taken out of one short list."""
-
-    def __init__(self) -> None:
-        self._blocks: list[list[float]] = []
-        self._least: list[float] = []
-
-    def add(self, value: float) -> None:
-        if not self._blocks:
-            self._blocks, self._least = [[value]], [value]
-            return
-        i = max(0, bisect_right(self._least, value) - 1)
-        block = self._blocks[i]
-        insort(block, value)
-        if len(block) > _BLOCK:
-            self._blocks[i : i + 1] = [block[: _BLOCK // 2], block[_BLOCK // 2 :]]
-            self._least[i : i + 1] = [block[0], block[_BLOCK // 2]]
-        else:
-            self._least[i] = block[0]
-
-    def remove(self, value: float) -> None:
-        """Take out one of the numbers equal to value, which must be there."""
-        i = bisect_right(self._least, value) - 1
-        block = self._blocks[i]
-        del block[bisect_left(block, value)]
-        if not block:
-            del self._blocks[i], self._least[i]
-            return
-        self._least[i] = block[0]
-        if len(block) < _BLOCK // 4 and len(self._blocks) > 1:
-            i = max(i, 1)
-            joined = self._blocks[i - 1] + self._blocks[i]
-            if len(joined) <= _BLOCK // 2:
-                self._blocks[i - 1 : i + 1] = [joined]
-                self._least[i - 1 : i + 1] = joined[:1]
-
-    def __getitem__(self, index: int) -> float:
-        for block in self._blocks:
-            if index < len(block):
-                return block[index]
-            index -= len(block)
-        raise IndexError(index)

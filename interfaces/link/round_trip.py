@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import deque
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -121,36 +120,6 @@ class ProbeConfig:
     """What the statistics look back on."""
 
 
-@dataclass(frozen=True, slots=True)
-class LinkStatistics:
-    """What a round-trip estimator knows, at one moment; None where nothing has come back yet."""
-
-    count: int
-    """Round trips in the window."""
-    median: float | None
-    """[s]."""
-    mean: float | None
-    """[s]."""
-    minimum: float | None
-    """[s]."""
-    maximum: float | None
-    """[s]."""
-    interquartile_range: float | None
-    """Between the quarters of the window [s]."""
-    jitter: float
-    """Smoothed size of the change from one round trip to the next [s]."""
-    loss_share: float | None
-    """Probes lost among the newest that were decided, as many as the window holds, in [0, 1]."""
-    sent: int
-    """Probes sent so far."""
-    returned: int
-    """Probes that came back so far."""
-    lost: int
-    """Probes that timed out so far."""
-    refused: int
-    """Echoes refused so far."""
-
-
 class DelayStatistics(SlidingQuantiles):
     """Quantiles, mean and jitter of a run of delays [s], all of one kind."""
 
@@ -180,12 +149,6 @@ class DelayStatistics(SlidingQuantiles):
         """
         return self._jitter
 
-    @property
-    def interquartile_range(self) -> float | None:
-        """Quantile 0.75 less quantile 0.25 [s]: jitter that outliers don't reach; None of an empty window."""
-        high, low = self.quantile(0.75), self.quantile(0.25)
-        return None if high is None or low is None else high - low
-
 
 class RelativeDelays(DelayStatistics):
     """One-way delays up to an unknown constant: the receiver's stamp less the sender's.
@@ -213,11 +176,6 @@ class RelativeDelays(DelayStatistics):
         self.add(delay, now=now)
         return delay
 
-    def spread(self, share: float) -> float | None:
-        """Quantile above the smallest delay of the window [s], ≥ 0: the offset cancels; None of an empty window."""
-        high, low = self.quantile(share), self.minimum
-        return None if high is None or low is None else high - low
-
 
 class RoundTripEstimator:
     """Probes a link and keeps statistics of the round trips.
@@ -244,10 +202,10 @@ class RoundTripEstimator:
         self._sequence = 0
         self.in_flight: dict[int, float] = {}
         """When each packet was sent [s], by sequence number, of those that haven't come back."""
-        self._delays = DelayStatistics(self.config.window)
-        self._fates: deque[bool] = deque()
-        self._recently_lost = 0
-        self._sent = self._returned = self._lost = self._refused = 0
+        self.delays = DelayStatistics(self.config.window)
+        """Round trips of the window [s]."""
+        self.sent = self.returned = self.lost = self.refused = 0
+        """Probes so far: sent, back in time, given up as lost; and echoes that were of no use."""
 
     def next_deadline(self) -> float:
         """When `to_send` has something to do [s]: a probe is due or one in flight is lost. May have passed."""
@@ -273,7 +231,7 @@ class RoundTripEstimator:
         probe = Probe(self._session, self._sequence, now)
         self.in_flight[self._sequence] = now
         self._sequence = (self._sequence + 1) % SEQUENCE_NUMBERS
-        self._sent += 1
+        self.sent += 1
         due = self._due + self.config.period
         self._due = due if due > now else now + self.config.period
         return probe
@@ -294,49 +252,12 @@ class RoundTripEstimator:
         self._advance(now)
         refusal = self._refuse(echo, now)
         if refusal is not None:
-            self._refused += 1
+            self.refused += 1
             return refusal
         trip = RoundTrip(self.in_flight.pop(echo.sequence), echo.received, echo.replied, now)
-        self._returned += 1
-        self._decide(lost=False)
-        self._delays.add(trip.delay, now=now)
+        self.returned += 1
+        self.delays.add(trip.delay, now=now)
         return trip
-
-    @property
-    def median(self) -> float | None:
-        """Median round trip of the window [s]; None before the first."""
-        return self._delays.median
-
-    @property
-    def mean(self) -> float | None:
-        """Mean round trip of the window [s]; None before the first."""
-        return self._delays.mean
-
-    def quantile(self, share: float) -> float | None:
-        """Round trip that the given share of those in the window doesn't exceed [s]; None before the first.
-
-        Raises:
-            InvalidValueError: If share lies outside [0, 1].
-        """
-        return self._delays.quantile(share)
-
-    def statistics(self) -> LinkStatistics:
-        """Everything known now."""
-        delays = self._delays
-        return LinkStatistics(
-            count=len(delays),
-            median=delays.median,
-            mean=delays.mean,
-            minimum=delays.minimum,
-            maximum=delays.maximum,
-            interquartile_range=delays.interquartile_range,
-            jitter=delays.jitter,
-            loss_share=self._recently_lost / len(self._fates) if self._fates else None,
-            sent=self._sent,
-            returned=self._returned,
-            lost=self._lost,
-            refused=self._refused,
-        )
 
     def _refuse(self, echo: Echo, now: float) -> EchoRefusal | None:
         if echo.session != self._session:
@@ -360,11 +281,4 @@ class RoundTripEstimator:
             if now < sent + self.config.timeout:
                 break
             del self.in_flight[sequence]
-            self._lost += 1
-            self._decide(lost=True)
-
-    def _decide(self, *, lost: bool) -> None:
-        if len(self._fates) == self.config.window.capacity:
-            self._recently_lost -= self._fates.popleft()
-        self._fates.append(lost)
-        self._recently_lost += lost
+            self.lost += 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from interfaces.media.camera import CameraConfig, CameraError, LiveCamera
+from interfaces.media.camera import CameraConfig
 from interfaces.media.door import MediaDoor
 from interfaces.media.live import LiveMedia
 from interfaces.media.presenter import Presenter
@@ -11,8 +11,6 @@ from interfaces.media.speech import Aloud, SpeechError
 __all__ = [
     "Aloud",
     "CameraConfig",
-    "CameraError",
-    "LiveCamera",
     "LiveMedia",
     "MediaDoor",
     "Presenter",

@@ -9,6 +9,7 @@ import contextlib
 import os
 import socket
 import sys
+from typing import BinaryIO
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
 from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
@@ -32,8 +33,9 @@ def run(connection: socket.socket) -> int:
     """
     with contextlib.suppress(OSError):
         os.nice(NICE)
+    orders = connection.makefile("rb")
     try:
-        setup = _order(connection)
+        setup = _order(orders)
         if not isinstance(setup, Setup):
             return 0 if setup is None else 2
         camera, lens = load(setup.robot).device(HeadCamera), setup.lens
@@ -43,7 +45,7 @@ def run(connection: socket.socket) -> int:
         video = video_encoder(lens.width, lens.height, setup.rate) if setup.video else None
         connection.sendall(encode(None))
         clock = WallClock()
-        while isinstance(shot := _order(connection), Shot):
+        while isinstance(shot := _order(orders), Shot):
             connection.sendall(encode(take(shot, sight, video, clock)))
     except FormatError:
         return 2
@@ -61,24 +63,14 @@ def take(shot: Shot, sight: Sight, video: VideoEncoder | None, clock: WallClock)
     return Taken(shot.number, frame, key, still, clock.now() - began)
 
 
-def _order(connection: socket.socket) -> Order | None:
+def _order(orders: BinaryIO) -> Order | None:
     """The next message; None where the other end is closed.
 
     Raises:
         FormatError: If it's none.
     """
-    head = _read(connection, HEAD)
-    return None if head is None else decode(_read(connection, size_of(head)) or b"", ORDERS)
-
-
-def _read(connection: socket.socket, size: int) -> bytes | None:
-    data = b""
-    while len(data) < size:
-        part = connection.recv(size - len(data))
-        if not part:
-            return None
-        data += part
-    return data
+    head = orders.read(HEAD)
+    return None if len(head) < HEAD else decode(orders.read(size_of(head)), ORDERS)
 
 
 if __name__ == "__main__":

@@ -16,14 +16,12 @@ from interfaces.middleware.middleware import (
 from interfaces.middleware.network import (
     Formulation,
     GainNetwork,
-    Ranges,
     TrainingConfig,
     default_network,
     load_network,
-    read_network,
     train,
 )
-from interfaces.middleware.performance import drive_measure, measure, optimal_gain, optimal_way
+from interfaces.middleware.performance import drive_measure, optimal_way
 
 __all__ = [
     "ActionAgent",
@@ -35,15 +33,11 @@ __all__ = [
     "GainScheduler",
     "GainSchedulingMiddleware",
     "MiddlewareConfig",
-    "Ranges",
     "TrainingConfig",
     "default_network",
     "drive_measure",
     "load_network",
-    "measure",
-    "optimal_gain",
     "optimal_way",
     "predicted",
-    "read_network",
     "train",
 ]

@@ -302,11 +302,11 @@ class GainSchedulingMiddleware:
         """
         config, traffic = self.config, self.traffic
         if config.predicts:
-            median = traffic.median
+            median = traffic.delays.median
             if median is None:
                 return None
             posture = predicted(posture, driving, median)
-        mean = traffic.mean
+        mean = traffic.delays.mean
         if config.schedules and mean is None:
             return None
         wanted = Drive(*self._controller(posture))

@@ -43,19 +43,6 @@ def tolerance(epsilon: float) -> float:
     return number_in("epsilon", epsilon, 1e-6, LARGEST_EPSILON)
 
 
-def measure(A: float, u: float) -> float:
-    """Return J of a quadratic factor A [1/m] and u = K τ [m]. Source: eq. (26)."""
-    turned = sinc(A * u)
-    return abs(u) * math.sqrt(turned * turned + 4 * A * A)
-
-
-def measures(A: ArrayLike, u: ArrayLike) -> Array:
-    """Return J of arrays of A [1/m] and u [m]."""
-    factor, way = np.asarray(A, dtype=np.float64), np.asarray(u, dtype=np.float64)
-    found: Array = np.abs(way) * np.hypot(np.sinc(factor * way / math.pi), 2 * factor)
-    return found
-
-
 def drive_measure(drive: Drive, tau: float) -> float:
     """Return J of a drive that is kept for a time τ [s]; a turn on the spot has one, too."""
     turned = sinc(0.5 * drive.w * tau)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import MISSING, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -25,6 +24,7 @@ from interfaces.rsp.model.elements import (
     RobotModel,
     Scalar,
     Sensor,
+    stated,
 )
 from vrs.errors import FormatError
 
@@ -52,18 +52,11 @@ def class_names(model: RobotModel) -> dict[str, str]:
 def literal(element: Element) -> list[str]:
     """An element as the lines of an expression."""
     lines = [f"{type(element).__name__}("]
-    for item in fields(element):
-        value = getattr(element, item.name)
-        if item.name in ("low", "high"):
-            assert isinstance(element, Effector)
-            if value == element.type.bounds[item.name == "high"]:
-                continue
-        elif item.default is not MISSING and value == item.default:
-            continue
+    for name, value in stated(element):
         if isinstance(value, tuple):
-            lines += [f"    {item.name}=(", *(f"        {_spelled(each)}," for each in value), "    ),"]
+            lines += [f"    {name}=(", *(f"        {_spelled(each)}," for each in value), "    ),"]
         else:
-            lines.append(f"    {item.name}={_spelled(value)},")
+            lines.append(f"    {name}={_spelled(value)},")
     return [*lines, "),"]
 
 

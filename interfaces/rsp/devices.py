@@ -71,7 +71,7 @@ class EffectorDevice(Device, Generic[V]):
         self._element, self._format = element, element.format
         self._activated = False
         self._active = True
-        initial = element.initial if element.type.value[0] == "f" else int(element.initial)
+        initial = int(element.initial) if element.type.whole else element.initial
         self._values: list[V] = cast("list[V]", [initial] * element.count)
 
     def write(self, index: int, value: V) -> None:
@@ -92,15 +92,14 @@ class EffectorDevice(Device, Generic[V]):
 
     def write_all(self, values: Sequence[V]) -> None:
         """Set all values; arguments and errors as of `write`."""
-        element = self._element
+        element, whole = self._element, self._element.type.whole
         allowed = f"{element.count} of {element.type} in [{element.low:g}, {element.high:g}]"
         if len(values) != element.count:
             raise InvalidValueError(self.name, values, allowed)
         for value in values:
             fits = element.low <= finite(self.name, value, allowed) <= element.high
-            if not fits or (element.type.value[0] != "f" and int(value) != value):
+            if not fits or (whole and int(value) != value):
                 raise InvalidValueError(self.name, value, allowed)
-        whole = element.type.value[0] != "f"
         with self._middleware.changed:
             self._values = [cast("V", int(value) if whole else float(value)) for value in values]
             if self._active:
@@ -255,13 +254,12 @@ class CommandDevice(Device, Generic[V]):
         assert isinstance(element, Command)
         low, high = element.type.bounds
         allowed = f"{element.count} of {element.type}"
-        whole = element.type.value[0] != "f"
+        whole = element.type.whole
         fits = all(low <= finite(self.name, v, allowed) <= high and (not whole or int(v) == v) for v in values)
         if len(values) != element.count or not fits:
             raise InvalidValueError(self.name, values, allowed)
-        packed = element.format.pack(*(int(v) if whole else v for v in values))
         with self._middleware.changed:
-            return CommandTicket(self, self._middleware.core.command(self._index, packed))
+            return CommandTicket(self, self._middleware.core.command(self._index, element.pack(values)))
 
 
 class ModuleDevice(Requested):

@@ -138,27 +138,6 @@ def received(data: bytes, keys: Keyring | None, ranks: Iterable[Rank]) -> tuple[
     return packet[header.SIZE :], right[0] if right else None
 
 
-class Cookies:
-    """Proofs that somebody really is at an address, without a memory of who asked."""
-
-    def __init__(self, secret: bytes) -> None:
-        """Take 32 bytes that nobody knows."""
-        self._secret = secret
-
-    def cookie(self, address: bytes, nonce: bytes, now: float) -> bytes:
-        """The cookie for an address and a nonce, at a time [s]."""
-        return self._made(address, nonce, int(now // COOKIE_LIFE))
-
-    def good(self, asked: Open, address: bytes, now: float) -> bool:
-        """Whether a cookie is one of ours for that address, and not too old."""
-        age = int(now // COOKIE_LIFE)
-        now_or_before = (self._made(address, asked.nonce, age - back) for back in (0, 1))
-        return any(hmac.compare_digest(one, asked.cookie) for one in now_or_before)
-
-    def _made(self, address: bytes, nonce: bytes, age: int) -> bytes:
-        return hmac.digest(self._secret, nonce + age.to_bytes(8, "big", signed=True) + address, "sha256")[:TAG]
-
-
 RATE: Final = 100.0
 """Requests for a session that are looked at [1/s], of proven addresses and of others."""
 
@@ -204,7 +183,7 @@ class SessionDoor:
         """
         self._model, self._random, self._keys = model, random_bytes, keys
         self._idle, self._takeover = idle, takeover
-        self._cookies = Cookies(random_bytes(32))
+        self._secret = random_bytes(32)
         self._allowed = {proven: Bucket(RATE, RATE, 0.0) for proven in (False, True)}
         """Requests by whether their address is proven: who makes addresses up takes nothing from who has one."""
         self.pending: SessionClaim | None = None
@@ -232,7 +211,8 @@ class SessionDoor:
         asked = decode_open(body)
         if self._keys is not None and asked.rank is not rank:
             raise PacketDropped(DropReason.AUTHENTICATION)
-        proven = self._cookies.good(asked, address, now)
+        cookie, before = (self._cookie(address, asked.nonce, now - back) for back in (0.0, COOKIE_LIFE))
+        proven = any(hmac.compare_digest(one, asked.cookie) for one in (cookie, before))
         if not self._allowed[proven].take(now):
             raise PacketDropped(DropReason.UNEXPECTED)
 
@@ -241,7 +221,6 @@ class SessionDoor:
             return [(sent(kind, body, made, self._keys, asked.rank), address)]
 
         if not proven:
-            cookie = self._cookies.cookie(address, asked.nonce, now)
             return answer(PacketType.CHALLENGE, encode_answer(asked.nonce, cookie))
         refusal = self._refusal(asked, heard, now)
         if refusal is not None:
@@ -253,6 +232,11 @@ class SessionDoor:
             claim = self.pending = self._claim(asked, address, head.stamp)
         given = encode_answer(claim.nonce, claim.given)
         return [*over, *answer(PacketType.OPENED, given, claim.session.id)]
+
+    def _cookie(self, address: bytes, nonce: bytes, now: float) -> bytes:
+        """Proof that somebody is at an address, without a memory of who asked; a new one each `COOKIE_LIFE`."""
+        age = int(now // COOKIE_LIFE).to_bytes(8, "big", signed=True)
+        return hmac.digest(self._secret, nonce + age + address, "sha256")[:TAG]
 
     def _refusal(self, asked: Open, heard: float | None, now: float) -> SessionRefusal | None:
         if heard is None or now - heard >= self._idle:

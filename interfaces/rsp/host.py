@@ -13,8 +13,9 @@ from interfaces.rsp.motion_filter import Values
 from interfaces.rsp.outputs import Commanded, RobotChange, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.session import SLACK
-from vrs.checks import number_in
 
+PERIOD: Final = 0.016
+"""Between two looks at effectors and sensors [s]; rounded to whole steps of the body."""
 FRAGMENT_TIME: Final = 0.02
 """How long a fragment of sound is played [s]."""
 MOST_BEHIND: Final = 0.25
@@ -54,21 +55,18 @@ class HostedBody(Protocol):
 class RspHost:
     """Runs a body and a robot's core together; it knows no socket and no clock."""
 
-    def __init__(
-        self, core: RobotCore, body: HostedBody, moves: frozenset[str], *, period: float = 0.016, now: float = 0.0
-    ) -> None:
+    def __init__(self, core: RobotCore, body: HostedBody, moves: frozenset[str], *, now: float = 0.0) -> None:
         """Join a body to a core.
 
         Args:
             core: Of the robot's side.
             body: Its body.
             moves: Bindings of effectors that the body has.
-            period: Between two looks at effectors and sensors [s], in [0.001, 1]; rounded to whole steps.
             now: When it begins [s].
         """
         self.core, self.body, self.model = core, body, core.model
         self._moves = moves
-        self._steps = max(1, round(number_in("period", period, 1e-3, 1.0, unit=" s") / body.step))
+        self._steps = max(1, round(PERIOD / body.step))
         self.stored: dict[str, bytes] = {}
         """Newest data of each memory command, by name."""
         self._next = self._sound = now

@@ -23,6 +23,7 @@ from __future__ import annotations
 import enum
 import struct
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Final
 
 from interfaces.rsp.errors import PacketError
@@ -97,7 +98,7 @@ class Layout:
         self._spare = 8 * self.map_size - self.count
         self.sizes = tuple(tuple(_size(element, model, way) for element in model) for way in PacketDirection)
         """By way and element: bytes of the payload, −1 if it says so itself, None if there can be none."""
-        self._plans: tuple[dict[int, tuple[tuple[int, int, int], ...] | None], ...] = ({}, {})
+        self._planned = lru_cache(_MOST_PLANNED // self.count)(self._plan)
         self.longest = tuple(self._longest(way) for way in PacketDirection)
         """Longest body, by way [byte]."""
         self.room = tuple(self._room(way) for way in PacketDirection)
@@ -158,14 +159,7 @@ class Layout:
         if not size <= len(body) <= self.longest[way]:
             raise PacketError("the length of its body")
         bits = int.from_bytes(body[:size], "big")
-        plans = self._plans[way]
-        if bits in plans:
-            plan = plans[bits]
-        else:
-            plan = self._plan(bits, way)
-            if len(plans) >= _MOST_PLANNED // self.count:
-                plans.clear()
-            plans[bits] = plan
+        plan = self._planned(bits, way)
         if plan is None:
             return self._searched(body, bits, way)
         if len(body) != (plan[-1][2] if plan else size):

@@ -12,8 +12,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from interfaces.link.proxy.proxy import parse_address
 from interfaces.messages.control import Role
@@ -34,9 +33,9 @@ _LONGEST_WAIT: Final = 0.1
 
 
 class UdpLink:
-    """Runs a local system's side; use it as a context manager."""
+    """Runs a local system's side, from `open` to `close`."""
 
-    def __init__(self, middleware: Middleware, address: str, *, clock: WallClock | None = None) -> None:
+    def __init__(self, middleware: Middleware, address: str, clock: WallClock) -> None:
         """Take what it runs, and where the robot listens, as HOST:PORT.
 
         Raises:
@@ -54,13 +53,13 @@ class UdpLink:
             raise FormatError(address, error.strerror or "no such address") from None
         self._socket.setblocking(False)
         self.middleware = middleware
-        self._clock = WallClock() if clock is None else clock
+        self._clock = clock
         self._wake, self._woken = socket.socketpair()
         self._woken.setblocking(False)
         self._over = False
         self._thread = threading.Thread(target=self._run, name=f"rsp {address}", daemon=True)
 
-    def open(self, *, timeout: float = 5.0, takeover: bool = False) -> Self:
+    def open(self, *, timeout: float, takeover: bool) -> None:
         """Open a session.
 
         Raises:
@@ -72,13 +71,10 @@ class UdpLink:
         self._thread.start()
         self._wake.send(b"\0")
         if not self.middleware.wait_for(lambda: self.middleware.core.state is not LocalState.OPENING, timeout):
-            self.close()
             raise DeadlineError("a session", timeout)
         if self.middleware.core.state is not LocalState.OPEN:
             refused = self.middleware.refused
-            self.close()
             raise DeadlineError("a session", timeout) if refused is None else NoSessionError(refused.name.lower())
-        return self
 
     def close(self) -> None:
         """End the session and the thread."""
@@ -92,14 +88,6 @@ class UdpLink:
             self._thread.join(2.0)
         for each in (self._socket, self._wake, self._woken):
             each.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _run(self) -> None:
         middleware, core, clock = self.middleware, self.middleware.core, self._clock
@@ -128,16 +116,7 @@ class UdpLink:
 _RANKS = {Role.OPERATOR: Rank.OPERATOR, Role.ADMIN: Rank.ADMIN}
 
 
-def read_keys(path: Path) -> Keyring:
-    """The keys of a token file: its operator's and its admin's tokens.
-
-    Raises:
-        FormatError: If it can't be read, others may read it, or it has neither.
-    """
-    return keys_of(read_tokens(path), path)
-
-
-def keys_of(tokens: dict[Role, str], path: Path) -> Keyring:
+def keys_of(tokens: dict[Role, str], path: Path | None) -> Keyring:
     """The keys of tokens from a file.
 
     Raises:
@@ -175,13 +154,14 @@ def opened(
         FormatError: If the address can't be resolved or the file read.
         InvalidValueError: If the timeout isn't finite.
     """
-    keys = None if key_file is None else read_keys(key_file)
+    keys = None if key_file is None else keys_of(read_tokens(key_file), key_file)
     rank = Rank.ADMIN if keys is not None and (takeover or Rank.OPERATOR not in keys) else Rank.OPERATOR
     clock = WallClock()
     config = LocalConfig() if config is None else config
     patience = max(config.patience, min(finite("timeout", timeout, "finite seconds"), MOST_PATIENCE))
     core = LocalCore(model, secrets.token_bytes, replace(config, patience=patience), keys=keys, rank=rank)
-    with UdpLink(Middleware(core, clock), address, clock=clock).open(timeout=timeout, takeover=takeover) as link:
+    with contextlib.closing(UdpLink(Middleware(core, clock), address, clock)) as link:
+        link.open(timeout=timeout, takeover=takeover)
         yield link.middleware
 
 

@@ -64,7 +64,7 @@ class _Track:
 
     def __init__(self, effector: Effector) -> None:
         self.linear = effector.filling is Filling.LINEAR
-        self.whole = effector.type.value[0] != "f"
+        self.whole = effector.type.whole
         self.stamps: list[float] = [-math.inf]
         self.values: list[Values] = [(effector.initial,) * effector.count]
         self.given = self.values[0]

@@ -491,6 +491,4 @@ class RobotCore:
         for watching in self._telling.monitors.get(index, ()):
             effector = self.model.elements[index]
             assert isinstance(effector, Effector)
-            values = self.motion.given(index)
-            whole = effector.type.value[0] != "f"
-            self.measure(watching, effector.format.pack(*(int(v) if whole else v for v in values)))
+            self.measure(watching, effector.pack(self.motion.given(index)))

@@ -40,12 +40,10 @@ class Rank(enum.IntEnum):
 
 def hkdf(secret: bytes, salt: bytes, info: bytes, length: int) -> bytes:
     """HKDF-SHA256. Source: RFC 5869."""
-    key = hmac.digest(salt or bytes(32), secret, "sha256")
-    out, block = b"", b""
-    while len(out) < length:
-        block = hmac.digest(key, block + info + bytes([len(out) // 32 + 1]), "sha256")
-        out += block
-    return out[:length]
+    from cryptography.hazmat.primitives.hashes import SHA256
+    from cryptography.hazmat.primitives.kdf.hkdf import HKDF
+
+    return HKDF(SHA256(), length, salt, info).derive(secret)
 
 
 class Keyring:

@@ -176,11 +176,7 @@ class TwinRun:
 
 
 def commands_alone(
-    model: RobotModel,
-    start: Array,
-    sent: Iterable[tuple[float, Command | None, Receipt | None]],
-    *,
-    now: float = 0.0,
+    model: RobotModel, start: Array, sent: Iterable[tuple[float, Command | None, Receipt | None]]
 ) -> Timeline:
     """What commands make of a virtual robot that nothing corrects.
 
@@ -188,9 +184,8 @@ def commands_alone(
         model: The robot.
         start: Joints at the start [rad], (n,).
         sent: What the engine that was corrected took: when [s], the command (None for an undo), and its receipt.
-        now: When that engine began [s].
     """
-    clock = ManualClock(now)
+    clock = ManualClock(0.0)
     engine = Engine(model, q=start, clock=clock, lateness=Lateness.POSTPONE)
     return carried_out(engine, clock, sent)
 

@@ -93,7 +93,7 @@ class SiteLine(Generic[V_co, O, R]):
         return messages
 
     def change(self, conditions: LinkConditions, *, now: float) -> None:
-        """Emulate other conditions from now [s] on; what is on its way arrives as it was to. See `Lane.change`."""
+        """Emulate other conditions from now [s] on; what is on its way arrives as it was to: `Channel.change`."""
         before = self.link.conditions
         self.link.change(conditions, now)
         if conditions.forward != before.forward:

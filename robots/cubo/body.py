@@ -18,7 +18,7 @@ from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.mobile.position import FusedPosition, TruePosition
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
-from vrs.mobile import DriveLimits, clipped
+from vrs.mobile import clipped
 
 Values = tuple[float, ...]
 BUTTONS: Final = ("service", "message")
@@ -31,8 +31,6 @@ MEASURES: Final = (
 )  # fmt: skip
 """Bindings of sensors: (x, y, θ) [m, m, rad]; counts right, left; distances [m], 8 around from straight ahead, the
 reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds right, left [m/s]; angles [rad]."""
-EVENTS: Final = ("bumper", *(f"button.{name}" for name in BUTTONS))
-"""Bindings of events; each has the value 1."""
 COMMANDS: Final = ("ir", "say", "stop")
 """Bindings of commands: the infrared remote control sends a code, a phrase is said, arms, head and wheels stop."""
 _LIMBS: Final = {"arm.right": 0, "arm.left": 1, "tilt": 2}
@@ -51,7 +49,6 @@ class CuboBody(MobileBody):
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
         senses: Senses | None = None,
-        limits: DriveLimits = p.LIMITS,
         exact: bool = False,
     ) -> None:
         """Put a robot into a room, at rest.
@@ -62,7 +59,6 @@ class CuboBody(MobileBody):
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
             senses: What it senses with; proximity, unless given, and what tells it where it is.
-            limits: What commands must keep to; its own, unless given.
             exact: Whether it knows its posture exactly, instead of by odometry and an overhead camera.
 
         Raises:
@@ -80,7 +76,7 @@ class CuboBody(MobileBody):
         self._touched = False
         self._sounding = 0.0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
-        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=limits, senses=senses)
+        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
         self._position = TruePosition(self) if exact else FusedPosition(self)
         self._posture = self._position.posture()
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from interfaces.clients.ports import LocalPort, MemoryTransport
 from interfaces.engine_server.site import Site
-from interfaces.link import BernoulliLoss, Channel, Conditions, ConstantDelay, GammaDelay, Service
+from interfaces.link import BernoulliLoss, Channel, Conditions, ConstantDelay, DelayProfile, GammaDelay, Service
 from interfaces.runtime.laboratory import run_parts
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
@@ -41,7 +41,8 @@ class Joined:
 
     def remote(self, forward, backward, *, seed: int = 0, lead: float = 0.0):
         rng = np.random.default_rng(seed).spawn(2)
-        transport = MemoryTransport(self.site, Channel(forward, rng[0]), Channel(backward, rng[1]), lead=lead)
+        there, back = (Channel(_conditions(way), r) for way, r in zip((forward, backward), rng, strict=True))
+        transport = MemoryTransport(self.site, there, back, lead=lead)
         self.parts.append(transport)
         return transport.port
 
@@ -51,6 +52,11 @@ class Joined:
 
     def run(self, seconds: float) -> None:
         self.now = run_parts(self.parts, now=self.now, until=self.now + seconds)
+
+
+def _conditions(way: DelayProfile | Conditions) -> Conditions:
+    """Conditions themselves, or those of a link in order with a delay."""
+    return way if isinstance(way, Conditions) else Conditions(delay=way, service=Service.IN_ORDER)
 
 
 def constant(seconds: float) -> ConstantDelay:

@@ -15,7 +15,7 @@ from interfaces import Supervisor, Viewer
 from interfaces.clients.playhead import Mode
 from interfaces.clients.ports import LocalPort, MemoryTransport
 from interfaces.engine_server.journal import changed, difference
-from interfaces.link import Channel
+from interfaces.link import Channel, Conditions
 from interfaces.messages import FrameStatus, ViewForm
 from tests.interfaces.joined import HOME, MODEL, Joined, bad, constant, to
 from vrs import (
@@ -370,8 +370,8 @@ def test_on_a_slow_way_back_no_queue_grows(form):
     joined = Joined()
     joined.site.broadcast(50)
     rng = np.random.default_rng(0)
-    back = Channel(constant(1.0), rng)
-    transport = MemoryTransport(joined.site, Channel(constant(0.1), rng), back, most=5)
+    back = Channel(Conditions(delay=constant(1.0)), rng)
+    transport = MemoryTransport(joined.site, Channel(Conditions(delay=constant(0.1)), rng), back, most=5)
     joined.parts.append(transport)
     viewer = joined.add(Viewer(transport.port, form=form))
     for _ in range(100):

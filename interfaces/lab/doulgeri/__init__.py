@@ -21,14 +21,14 @@ PAPER: Final = Paper(
     "doulgeri",
     "Zoe Doulgeri, Nikos Zikos, Anastasios Delopoulos: Modelling and Interfacing Remote Virtual Robots",
     (
-        PaperPart.single("Fig. 1: segments", segments.work),
-        PaperPart.single("Section II-C: causality", causality.work),
+        PaperPart("Fig. 1: segments", segments.work),
+        PaperPart("Section II-C: causality", causality.work),
         PaperPart("Figs 4 to 6: delays", delays.work, delays.conclude, delays.CASES),
-        PaperPart.single("Section VI-B: broadcasters", broadcasting.work),
+        PaperPart("Section VI-B: broadcasters", broadcasting.work),
         PaperPart("(a) jitter", jitter.work, jitter.conclude, jitter.CASES),
         PaperPart("(b) compact encoding", encoding.work, encoding.conclude, encoding.MOTIONS),
         PaperPart("(c) dragging the tool", dragging.work, dragging.conclude, dragging.CASES),
-        PaperPart.single("(d) interactivity", interactivity.work),
+        PaperPart("(d) interactivity", interactivity.work),
         PaperPart("(e) virtual and real", agreement.work, agreement.conclude, agreement.CASES),
     ),
 )

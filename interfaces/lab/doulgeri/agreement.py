@@ -182,9 +182,7 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
     claims.append(at_most(text, SOURCE, DELAY + 2 * 0.05, max(noticed), slack=1e-6))
     table = Table.of("agreement", f"(e) virtual and real, {DELAY} s each way; {study.runs} runs", rows)
     picture = draw(
-        "e-agreement",
-        "(e) how far the timelines of the virtual and the real robot are apart",
-        lambda canvas: _paint(canvas, cases),
+        "e-agreement", "(e) how far the timelines of the virtual and the real robot are apart", _paint, cases
     )
     return Findings(tuple(claims), (table,), (picture,))
 
@@ -205,9 +203,7 @@ def _paint(canvas: Canvas, cases: dict[str, list[Results]]) -> None:
             )
         ax.axhline(AGREE, color=BAD, linewidth=0.9)
         ax.axvline(2 * DELAY if case == "late" else DELAY, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
-        ax.set_title(title)
-        ax.set_xlim(0.0, 4.0)
-        ax.set_xlabel("s (dashed: there and back, or the way back)")
+        ax.set(title=title, xlim=(0.0, 4.0), xlabel="s (dashed: there and back, or the way back)")
     axes[0].set_ylabel("largest joint difference from then on, rad")
     axes[0].annotate("1e-9", (3.9, AGREE), (0, 3), textcoords="offset points", ha="right", color=BAD)
     legend(axes[1], place="upper right")

@@ -73,11 +73,7 @@ def work(study: Study, _case: str) -> Findings:
         text = f"{rate} frames a second: interval between frames at the viewers off by at most [s]"
         claims.append(at_most(text, SECTION, 1e-6, even))
     table = Table.of("broadcasters", "Six broadcasters at once on one engine", rows)
-    picture = draw(
-        "broadcasters",
-        "Frames at the viewers, six broadcasters on one engine",
-        lambda canvas: _paint(canvas, delivered, gaps),
-    )
+    picture = draw("broadcasters", "Frames at the viewers, six broadcasters on one engine", _paint, delivered, gaps)
     return Findings(tuple(claims), (table,), (picture,), load())
 
 
@@ -128,7 +124,6 @@ def _paint(canvas: Canvas, delivered: dict[int, int], gaps: dict[int, np.ndarray
         times = 1e3 * gaps[rate]
         right.plot([k, k], [times.min(), times.max()], "o", color=REAL, markersize=3.5)
     right.set_xticks(x, [str(rate) for rate in delivered])
-    right.set_ylim(bottom=0.0)
-    right.set_title("interval, ms: asked (–), measured (•)")
+    right.set(ylim=(0.0, None), title="interval, ms: asked (–), measured (•)")
     for ax in (left, right):
         ax.set_xlabel("frames a second")

@@ -139,18 +139,10 @@ def conclude(study: Study, found: tuple[list[Any], ...]) -> Findings:
     shares = np.array(found[-1])
     claims += lead_claims(study, shares)
     title = f"Figs 4 to 6: D_f = {D_F} s, D_b = {D_B} s, {COMMANDS:g} commands a second"
+    timing = "Figs 4 to 6, from a run: a command and a frame under each clock offset"
     pictures = (
-        draw(
-            "figs4-6-timing",
-            "Figs 4 to 6, from a run: a command and a frame under each clock offset",
-            lambda canvas: _paint(canvas, [runs[0] for runs in found[:-1]]),
-            height=7.0,
-        ),
-        draw(
-            "falsified",
-            "Share of predicted frames that a command falsified",
-            lambda canvas: _paint_leads(canvas, study, shares),
-        ),
+        draw("figs4-6-timing", timing, _paint, [runs[0] for runs in found[:-1]], height=7.0),
+        draw("falsified", "Share of predicted frames that a command falsified", _paint_leads, study, shares),
     )
     return Findings(tuple(claims), (Table.of("delays", title, rows),), pictures)
 
@@ -241,9 +233,7 @@ def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
         capsize=3,
         label=f"measured, {points[0].name} over seeds",
     )
-    ax.set_xlabel("lead, s")
-    ax.set_ylabel("falsified, %")
-    ax.set_ylim(0.0, 100.0)
+    ax.set(xlabel="lead, s", ylabel="falsified, %", ylim=(0.0, 100.0))
     legend(ax, place="upper left")
 
 
@@ -286,9 +276,7 @@ def _timing(ax: Axes, setting: OffsetSetting, sent: Results) -> None:
         **how,
     )
     ax.annotate(f"clock reads {back - issued:.2f}: {abs(age):.2f} s old", (x_back, 1.0), (0, 5), color=REAL, **how)
-    ax.set_title(f"{setting.source}: {setting.title}")
-    ax.set_ylim(-0.75, 1.45)
-    ax.set_xlim(-0.25, 1.0)
+    ax.set(title=f"{setting.source}: {setting.title}", ylim=(-0.75, 1.45), xlim=(-0.25, 1.0))
     ax.set_yticks([])
     ax.grid(visible=False, axis="y")
     ax.spines["left"].set_visible(False)

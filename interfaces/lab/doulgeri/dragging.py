@@ -146,7 +146,7 @@ def conclude(study: Study, found: tuple[Results | None, ...]) -> Findings:
         for k, s in enumerate(seen)
     ]
     title = f"(c) dragging over `{DELAY}`: the real robot is behind by {behind.value:.2f} s on average"
-    picture = draw("c-dragging", "(c) a hand drags the tool", lambda canvas: _paint(canvas, seen[0]), height=3.4)
+    picture = draw("c-dragging", "(c) a hand drags the tool", _paint, seen[0], height=3.4)
     return Findings(claims, (Table.of("dragging", title, rows),), (picture,))
 
 
@@ -159,9 +159,7 @@ def _paint(canvas: Canvas, seen: Results) -> None:
     ):
         left.plot(*(1e3 * (points - middle)[:, (1, 2)].T), color=colour, linestyle=style, label=name, linewidth=1.2)
     left.set_aspect("equal", "datalim")
-    left.set_xlabel("y, mm")
-    left.set_ylabel("z, mm")
-    left.set_title("from in front")
+    left.set(xlabel="y, mm", ylabel="z, mm", title="from in front")
     for points, colour, name in (
         (seen.hand, INK, "hand"),
         (seen.virtual, VIRTUAL, "virtual"),
@@ -175,8 +173,6 @@ def _paint(canvas: Canvas, seen: Results) -> None:
         alpha=0.4,
         label="virtual from hand",
     )
-    right.set_xlabel("time, s")
-    right.set_ylabel("z, mm")
-    right.set_title("in time")
+    right.set(xlabel="time, s", ylabel="z, mm", title="in time")
     legend(right, columns=2, place="lower right")
     right.margins(y=0.25)

@@ -232,9 +232,7 @@ def conclude(study: Study, found: tuple[list[Results], ...]) -> Findings:
         )
     title = "(b) msgpack of the values, no names; of compact frames all that crosses"
     table = Table.of("encoding", title, rows)
-    picture = draw(
-        "b-encoding", "(b) bytes a second for the same motion", lambda canvas: _paint(canvas, means), height=3.2
-    )
+    picture = draw("b-encoding", "(b) bytes a second for the same motion", _paint, means)
     return Findings(tuple(claims), (table,), (picture,))
 
 

@@ -202,12 +202,7 @@ def work(study: Study, _case: str) -> Findings:
         ("what", "shows after s"),
         rows,
     )
-    picture = draw(
-        "d-interactivity",
-        "(d) what a user does while the robot moves",
-        lambda canvas: _paint(canvas, rows, seen),
-        height=3.2,
-    )
+    picture = draw("d-interactivity", "(d) what a user does while the robot moves", _paint, rows, seen)
     return Findings(claims, (table,), (picture,))
 
 
@@ -222,12 +217,9 @@ def _paint(canvas: Canvas, rows: tuple[tuple[str, float], ...], seen: Results) -
     left.set_yticks(y, [row[0] for row in rows])
     left.set_ylim(-0.6, y[0] + 1.1)
     left.grid(visible=False, axis="y")
-    left.set_xlabel("ms")
-    left.set_title("until the committed path shows it")
+    left.set(xlabel="ms", title="until the committed path shows it")
     t = np.array(seen.t)
     right.plot(t, t, color=MUTED, linestyle=(0, (4, 3)), linewidth=1.0, label="live")
     right.plot(t, seen.place, ".", color=REAL, markersize=2.5, label="the viewer's frames")
-    right.set_xlabel("user's time, s")
-    right.set_ylabel("time shown, s")
-    right.set_title("seek back while paused, then go live")
+    right.set(xlabel="user's time, s", ylabel="time shown, s", title="seek back while paused, then go live")
     legend(right, place="upper left")

@@ -208,19 +208,12 @@ def conclude(study: Study, found: tuple[Any, ...]) -> Findings:
         for how, seen in (("adaptive", result.adaptive), ("fixed", result.fixed))
     ]
     title = f"(a) jitter: {study.runs} runs of {study.length:g} s; mean path error smaller if adaptive in {smaller}"
+    one_run = "(a) one run: how far behind the robot plays, and what packets took"
     pictures = (
         draw(
-            "a-jitter",
-            "(a) path error and time difference of the real robot",
-            lambda canvas: _paint(canvas, study, results),
-            height=5.6,
+            "a-jitter", "(a) path error and time difference of the real robot", _paint, study, results, height=5.6
         ),
-        draw(
-            "a-jitter-run",
-            "(a) one run: how far behind the robot plays, and what packets took",
-            lambda canvas: _paint_run(canvas, results["thu@2"].traces),
-            height=3.0,
-        ),
+        draw("a-jitter-run", one_run, _paint_run, results["thu@2"].traces, height=3.0),
     )
     return Findings(tuple(claims), (Table.of("jitter", title, rows),), pictures)
 
@@ -281,7 +274,5 @@ def _paint_run(canvas: Canvas, traces: tuple[Results, Results]) -> None:
     for trace, colour, name in zip(traces, (VIRTUAL, REAL), ("adaptive D", "fixed D"), strict=True):
         ax.plot(trace.t, trace.behind, color=colour, label=f"the robot is behind, {name}")
     ax.plot(traces[0].sent, traces[0].delay, ".", color=MUTED, markersize=2, label="packet, by when it was sent")
-    ax.set_ylim(0.0, 1.15 * max(float(trace.behind.max()) for trace in traces))
-    ax.set_xlabel("time, s")
-    ax.set_ylabel("s")
+    ax.set(ylim=(0.0, 1.15 * max(float(trace.behind.max()) for trace in traces)), xlabel="time, s", ylabel="s")
     legend(ax, columns=3, place="upper center")

@@ -8,7 +8,7 @@ import numpy as np
 
 from interfaces.clients.ports import MemoryTransport, RemotePort
 from interfaces.engine_server.site import Site
-from interfaces.link import Channel, Conditions, ConstantDelay, LinkConditions
+from interfaces.link import Channel, Conditions, ConstantDelay, LinkConditions, Service
 from interfaces.messages import Broadcast, Frame, Outcome, Reply
 from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
 from interfaces.teleop import FollowingArm, JointReference, OperatorSite, RobotSiteConfig, VirtualArm
@@ -107,7 +107,8 @@ class ScriptedSite:
         """A port to the site over a link with constant delays [s]."""
         rng = np.random.default_rng(0).spawn(2)
         ways = [ConstantDelay(f"constant:{delay}", delay) for delay in (there, back)]
-        transport = MemoryTransport(self.site, Channel(ways[0], rng[0]), Channel(ways[1], rng[1]))
+        held = [Conditions(delay=way, service=Service.IN_ORDER) for way in ways]
+        transport = MemoryTransport(self.site, Channel(held[0], rng[0]), Channel(held[1], rng[1]))
         self._parts.append(transport)
         return transport.port
 

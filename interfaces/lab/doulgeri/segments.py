@@ -152,12 +152,7 @@ def work(study: Study, _case: str) -> Findings:
     rows = [_row(f"s{i + 1}", x) for i, x in enumerate(s)]
     rows += [_row(f"s{i + 1}'" if i else "s1", x) for i, x in enumerate(new)]
     table = Table("segments", "Fig. 1: joint 1 before and after the second command", columns, tuple(rows))
-    picture = draw(
-        "fig1-segments",
-        "Fig. 1: a second command in the linear segment",
-        lambda canvas: _paint(canvas, fig),
-        height=3.6,
-    )
+    picture = draw("fig1-segments", "Fig. 1: a second command in the linear segment", _paint, fig, height=3.6)
     return Findings(claims, (table,), (picture,))
 
 
@@ -206,6 +201,5 @@ def _paint(canvas: Canvas, fig: Results) -> None:
             ax.plot(ends, np.degrees(segment.value(ends)[:, 0]), "o", color=colour, markersize=3.5)
     ax.axvline(fig.t_exec, color=BAD, linewidth=0.9)
     ax.annotate("t exec", (fig.t_exec, ax.get_ylim()[1]), (4, -10), textcoords="offset points", color=BAD)
-    ax.set_xlabel("time on the timeline, s")
-    ax.set_ylabel("joint 1, deg")
+    ax.set(xlabel="time on the timeline, s", ylabel="joint 1, deg")
     legend(ax, place="lower left")

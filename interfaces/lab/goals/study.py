@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +23,7 @@ from interfaces.lab.claims import (
 )
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, Shortest, setting
 from interfaces.lab.goals.trial import Trip, seen_all, travel
-from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, to_json, write_files
+from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, write_runs
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.bullet.rooms import Block, Column, Room
 from robots.mobile.navigation import route_config
@@ -50,7 +48,7 @@ def maps(found: Sequence[Trip]) -> list[Figure]:
         shown = those[:DRAWN]
         rows = math.ceil(len(shown) / 2)
         title = f"Trips: {group}"
-        figures.append(draw(f"goals_{group}", title, lambda c, s=shown: _maps(c, s), height=3.4 * rows))  # type: ignore[misc]
+        figures.append(draw(f"goals_{group}", title, _maps, shown, height=3.4 * rows))
     return figures
 
 
@@ -88,8 +86,7 @@ def draw_room(ax: Axes, room: Room) -> None:
         ax.add_patch(Polygon(_ring(thing), closed=True, facecolor=fill, edgecolor=MUTED, linewidth=0.8))
     for person in room.people:
         ax.plot(person.x, person.y, color=MUTED, linewidth=0.6, linestyle=":")
-    ax.set_xlim(-0.1, room.length + 0.1)
-    ax.set_ylim(-0.1, room.width + 0.1)
+    ax.set(xlim=(-0.1, room.length + 0.1), ylim=(-0.1, room.width + 0.1))
 
 
 def _ring(thing: Block | Column) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -275,12 +272,4 @@ def write(found: Reproduction, out: Path) -> None:
     Raises:
         FormatError: If it can't hold them.
     """
-    lines = io.StringIO()
-    rows = csv.writer(lines, lineterminator="\n")
-    rows.writerow(EACH)
-    for table in found.findings.tables:
-        if table.columns == EACH:
-            rows.writerows(
-                [f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in table.rows
-            )
-    write_files(out, found.findings.figures, {"runs.csv": lines.getvalue(), "summary.json": to_json(found)})
+    write_runs(found, out, [table for table in found.findings.tables if table.columns == EACH])

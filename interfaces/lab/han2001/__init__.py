@@ -12,8 +12,8 @@ PAPER: Final = Paper(
     "Han, Kim, Kim, Kim: Internet Control Architecture for Internet-Based Personal Robot, "
     "Autonomous Robots 10, 2001",
     (
-        PaperPart.single("Information loss", information.work),
-        PaperPart.single("Command filter", information.work_filter),
+        PaperPart("Information loss", information.work),
+        PaperPart("Command filter", information.work_filter),
         PaperPart("Architectures", architectures.work, architectures.conclude, architectures.CASES),
     ),
     length=120.0,

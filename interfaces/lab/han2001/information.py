@@ -84,8 +84,7 @@ def _figure(t: Array, sent: Array, there: Array) -> Figure:
         ax = canvas.subplots()
         ax.plot(t, sent, color=VIRTUAL, label="sent")
         ax.step(t, there, where="post", color=REAL, label="received")
-        ax.set_xlabel("time [s]")
-        ax.set_ylabel("y(t)")
+        ax.set(xlabel="time [s]", ylabel="y(t)")
         legend(ax, columns=2, place="upper right")
 
     return draw("fig3", f"A sine through the internet ({PROFILE}), Fig. 3", paint)

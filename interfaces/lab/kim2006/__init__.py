@@ -12,7 +12,7 @@ PAPER: Final = Paper(
     "Kim, Suh, Kim, Oh: A novel real-time control architecture for Internet-based Thin-client robot; "
     "Simulacrum-based approach",
     (
-        PaperPart.single("Variable packet size", packets.work),
+        PaperPart("Variable packet size", packets.work),
         PaperPart("Path following", links.work, links.conclude, links.CASES),
         PaperPart("Narrow links", links.work_narrow, links.conclude_narrow, links.NARROW_CASES),
     ),

@@ -207,12 +207,12 @@ def run(case: FollowingCase) -> Followed:
             for arrived in link.forward.receive(now):
                 robot.receive(arrived.payload, now=now)
             for answer in link.backward.receive(now):
-                local.receive(answer.payload, now=now)
+                local.receive(answer.payload, now)
             if local.seen is not None:
-                local.write(lead(local.seen), now=now)
+                local.write(lead(local.seen))
             if k % round(FIRE / TICK) == 0 and now < case.length:
                 given.append(now)
-                local.fire(now=now)
+                local.fire()
             for data in local.to_send(now=now):
                 down += len(data)
                 link.forward.send(data, now, len(data) + chosen.header)

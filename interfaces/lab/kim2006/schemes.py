@@ -6,9 +6,7 @@ import struct
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
-
-from typing_extensions import override
+from typing import Final, TypeAlias
 
 from interfaces.link.conditions import Service
 from interfaces.rsp.local import LocalConfig, LocalCore, LocalState, PeriodConfig
@@ -22,50 +20,6 @@ from vrs.checks import one_of
 
 Rims = tuple[int, int]
 """Speeds of the left and the right wheel at the rim [mm/s]."""
-
-
-class LocalEnd(Protocol):
-    """The local system's end."""
-
-    seen: Posture | None
-    """Newest posture that came."""
-
-    def write(self, rims: Rims, *, now: float) -> None:
-        """Set what the wheels are to do."""
-
-    def fire(self, *, now: float) -> None:
-        """Give a command: something that is to be done once."""
-
-    def receive(self, data: bytes, *, now: float) -> None:
-        """Take a packet."""
-
-    def to_send(self, *, now: float) -> list[bytes]:
-        """Packets that are due by now [s]."""
-
-
-class RobotEnd(Protocol):
-    """The robot's end."""
-
-    def receive(self, data: bytes, *, now: float) -> None:
-        """Take a packet."""
-
-    def drive(self, *, now: float) -> Rims:
-        """What the wheels do from now on [s]."""
-
-    def fired(self) -> list[int]:
-        """Numbers of the commands that came since the last call, from 0."""
-
-    def measure(self, posture: Posture) -> None:
-        """Set where the robot is."""
-
-    def to_send(self, *, now: float) -> list[bytes]:
-        """Packets that are due by now [s]."""
-
-    @property
-    def stamp(self) -> float | None:
-        """When what the wheels do was given, on the local system's clock [s]; None before anything came."""
-
-
 PERIOD: Final = 0.02
 """T of all schemes [s], the paper's."""
 LOSS: Final = 0.5
@@ -84,7 +38,7 @@ FIXED_UP: Final = 96
 """And from it [byte]: all of a thin client's sensors."""
 
 
-class PlainLocal(LocalEnd):
+class PlainLocal:
     """The local system's end of a scheme without a simulacrum: inputs are repeated, nobody acknowledges anything.
 
     A packet down has all that RSP's largest could have, whether it's needed or not; the repeated inputs are as
@@ -99,6 +53,7 @@ class PlainLocal(LocalEnd):
             size: Of every packet [byte]; 0 for as small as it can be.
         """
         self.seen: Posture | None = None
+        """Newest posture that came."""
         self._size = size
         self._recent: deque[bytes] = deque(maxlen=repeats)
         self._rims: Rims = (0, 0)
@@ -107,24 +62,23 @@ class PlainLocal(LocalEnd):
         self._next = 0.0
         self._newest = -1
 
-    @override
-    def write(self, rims: Rims, *, now: float) -> None:
+    def write(self, rims: Rims) -> None:
+        """Set what the wheels are to do."""
         self._rims = rims
 
-    @override
-    def fire(self, *, now: float) -> None:
+    def fire(self) -> None:
+        """Give a command: something that is to be done once."""
         self._fires.append(self._count)
         self._count += 1
 
-    @override
-    def receive(self, data: bytes, *, now: float) -> None:
-        """See `LocalEnd`; what is older than the newest is of no use."""
+    def receive(self, data: bytes, _now: float) -> None:
+        """Take a packet; what is older than the newest is of no use."""
         number, x, y, theta = _UP.unpack_from(data)
         if number > self._newest:
             self._newest, self.seen = number, Posture(x, y, theta)
 
-    @override
     def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
         if now < self._next - SLACK:
             return []
         self._next = max(self._next + PERIOD, now + 0.5 * PERIOD)
@@ -134,7 +88,7 @@ class PlainLocal(LocalEnd):
         return [(head + b"".join(self._recent)).ljust(self._size, b"\0")]
 
 
-class PlainRobot(RobotEnd):
+class PlainRobot:
     """The robot's end."""
 
     def __init__(self, model: RobotModel, size: int) -> None:
@@ -156,7 +110,7 @@ class PlainRobot(RobotEnd):
         self._next = 0.0
 
     def receive(self, data: bytes, *, now: float) -> None:
-        """See `RobotEnd`; inputs that came are skipped, those that were lost and are repeated aren't."""
+        """Take a packet; inputs that came are skipped, those that were lost and are repeated aren't."""
         number, stamp, count = _HEAD.unpack_from(data)
         if number <= self._newest:
             return
@@ -169,25 +123,25 @@ class PlainRobot(RobotEnd):
             self._filter.receive(1e-3 * stamp - (number - k) * PERIOD, told, now=now, fresh=k == number)
         self._newest, self._heard = number, now
 
-    @override
     def drive(self, *, now: float) -> Rims:
+        """What the wheels do from now on [s]."""
         self._filter.play(now)
         if self._heard is None or now - self._heard >= LOSS:
             return 0, 0
         left, right = (self._filter.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
 
-    @override
     def fired(self) -> list[int]:
+        """Numbers of the commands that came since the last call, from 0."""
         found, self._commands = self._commands, []
         return found
 
-    @override
     def measure(self, posture: Posture) -> None:
+        """Set where the robot is."""
         self._posture = posture
 
-    @override
     def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
         if self._heard is None or now < self._next - SLACK:
             return []
         self._next = max(self._next + PERIOD, now + 0.5 * PERIOD)
@@ -195,15 +149,15 @@ class PlainRobot(RobotEnd):
         return [_UP.pack(self._number, *self._posture).ljust(self._size, b"\0")]
 
     @property
-    @override
     def stamp(self) -> float | None:
+        """When what the wheels do was given, on the local system's clock [s]; None before anything came."""
         return self._filter.playing
 
 
 _ADDRESS: Final = b"local"
 
 
-class RspLocal(LocalEnd):
+class RspLocal:
     """The local system's end."""
 
     def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: LocalConfig) -> None:
@@ -211,6 +165,7 @@ class RspLocal(LocalEnd):
         self.core = LocalCore(model, random_bytes, config)
         self.core.open(now=0.0)
         self.seen: Posture | None = None
+        """Newest posture that came."""
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
         self._fire, self._position = model.index("ir_fire"), model.index("position")
         self.core.request(self._position, True)
@@ -220,19 +175,18 @@ class RspLocal(LocalEnd):
         self._number = 0
         self._waiting: list[bytes] = []
 
-    @override
-    def write(self, rims: Rims, *, now: float) -> None:
+    def write(self, rims: Rims) -> None:
+        """Set what the wheels are to do."""
         for index, rim in zip((self._left, self._right), rims, strict=True):
             self.core.write(index, rim.to_bytes(2, "big", signed=True))
 
-    @override
-    def fire(self, *, now: float) -> None:
-        """See `LocalEnd`; before there's a session it waits."""
+    def fire(self) -> None:
+        """Give a command: something that is to be done once; before there's a session it waits."""
         self._waiting.append(bytes([self._number % 256]))
         self._number += 1
 
-    @override
-    def receive(self, data: bytes, *, now: float) -> None:
+    def receive(self, data: bytes, now: float) -> None:
+        """Take a packet."""
         self.core.receive(data, now=now)
         for output in self.core.take():
             if isinstance(output, Told) and output.index == self._position:
@@ -240,8 +194,8 @@ class RspLocal(LocalEnd):
                 x, y, theta = self._sensor.format.unpack(output.payload)
                 self.seen = Posture(scale * x, scale * y, scale * theta)
 
-    @override
     def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
         if self.core.state is LocalState.OPEN:
             for values in self._waiting:
                 self.core.command(self._fire, values)
@@ -249,7 +203,7 @@ class RspLocal(LocalEnd):
         return self.core.to_send(now=now)
 
 
-class RspRobot(RobotEnd):
+class RspRobot:
     """The robot's end."""
 
     def __init__(self, model: RobotModel, random_bytes: Callable[[int], bytes], config: RobotConfig) -> None:
@@ -262,34 +216,34 @@ class RspRobot(RobotEnd):
         self._sensor = sensor
         self._commands: list[int] = []
 
-    @override
     def receive(self, data: bytes, *, now: float) -> None:
+        """Take a packet."""
         self.core.receive(data, _ADDRESS, now=now)
 
-    @override
     def drive(self, *, now: float) -> Rims:
+        """What the wheels do from now on [s]."""
         self.core.effectors(now=now)
         self._commands += [output.id for output in self.core.take() if isinstance(output, Commanded)]
         left, right = (self.core.motion.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
 
-    @override
     def fired(self) -> list[int]:
+        """Numbers of the commands that came since the last call, from 0."""
         found, self._commands = self._commands, []
         return found
 
-    @override
     def measure(self, posture: Posture) -> None:
+        """Set where the robot is."""
         raw = (round(value / self._sensor.scale) for value in posture)
         self.core.measure(self._position, self._sensor.format.pack(*raw))
 
-    @override
     def to_send(self, *, now: float) -> list[bytes]:
+        """Packets that are due by now [s]."""
         return [data for data, _ in self.core.to_send(now=now)]
 
     @property
     def stamp(self) -> float | None:
-        """See `RobotEnd`: an effector that isn't in a packet is as it was when that was made."""
+        """When what wheels do was given [s]: an effector that isn't in a packet is as it was when that was made."""
         return self.core.motion.playing
 
 
@@ -299,7 +253,8 @@ TCP_HEADER: Final = 40
 """IPv4 and TCP without options [byte]."""
 
 
-Ends = tuple[LocalEnd, RobotEnd]
+Ends: TypeAlias = tuple[PlainLocal | RspLocal, PlainRobot | RspRobot]
+"""The local system's end and the robot's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +278,7 @@ def _rsp(model: RobotModel, random_bytes: Callable[[int], bytes], adaptive: bool
         for data in local.to_send(now=0.0):
             robot.receive(data, now=0.0)
         for data in robot.to_send(now=0.0):
-            local.receive(data, now=0.0)
+            local.receive(data, 0.0)
     return local, robot
 
 

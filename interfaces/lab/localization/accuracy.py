@@ -76,10 +76,8 @@ def scenes(given: Sequence[DrawnDrive]) -> list[Figure]:
     what = f"{scene.room.name}, ellipses {SCALE:g} times as large"
     height = 7.2 * scene.room.width / scene.room.length
     return [
-        draw(
-            "localization_map", f"Map, scans and estimates: {what}", lambda c: _map(c, scene, record), height=height
-        ),
-        draw("localization_errors", "Errors over time", lambda c: _errors(c, record), height=4.2),
+        draw("localization_map", f"Map, scans and estimates: {what}", _map, scene, record, height=height),
+        draw("localization_errors", "Errors over time", _errors, record, height=4.2),
     ]
 
 
@@ -101,8 +99,7 @@ def _map(canvas: Canvas, scene: DrawnDrive, record: Record) -> None:
         ax.plot(ring[:, 0], ring[:, 1], color=BAD, linewidth=1.0, label="estimate, 95 %" if k == 0 else None)
         ax.plot([x, x + 0.25 * math.cos(theta)], [y, y + 0.25 * math.sin(theta)], color=BAD, linewidth=1.0)
     ax.set_aspect("equal")
-    ax.set_xlabel("x [m]")
-    ax.set_ylabel("y [m]")
+    ax.set(xlabel="x [m]", ylabel="y [m]")
     canvas.legend(loc="outside upper center", ncols=5, fontsize=8.0, labelcolor=INK)
 
 
@@ -122,8 +119,7 @@ def _errors(canvas: Canvas, record: Record) -> None:
     _bound(upper, record, first, (0, 1), 100.0)
     _bound(lower, record, first, (2,), math.degrees(1.0))
     for ax, what, low, bar in ((upper, "position [cm]", 0.01, 1.0), (lower, "heading [deg]", 0.003, 0.3)):
-        ax.set_yscale("log")
-        ax.set_ylim(bottom=low)
+        ax.set(yscale="log", ylim=(low, None))
         ax.axhline(bar, color=INK, linewidth=0.7, linestyle=":")
         ax.set_ylabel(what)
     lower.set_xlabel("time [s]")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 
@@ -21,7 +19,7 @@ from interfaces.lab.localization.searching import (
     measure_symmetric,
 )
 from interfaces.lab.localization.trial import body_of, drive, setting
-from interfaces.lab.output import to_json, write_files
+from interfaces.lab.output import write_runs
 from robots.bullet.rooms import Room, read_room
 from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
@@ -154,9 +152,4 @@ def write(found: Reproduction, out: Path) -> None:
     Raises:
         FormatError: If it can't hold them.
     """
-    rooms = next(table for table in found.findings.tables if table.name == "rooms")
-    lines = io.StringIO()
-    rows = csv.writer(lines, lineterminator="\n")
-    rows.writerow(rooms.columns)
-    rows.writerows([f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in rooms.rows)
-    write_files(out, found.findings.figures, {"runs.csv": lines.getvalue(), "summary.json": to_json(found)})
+    write_runs(found, out, [table for table in found.findings.tables if table.name == "rooms"])

@@ -11,7 +11,7 @@ PAPER: Final = Paper(
     "tipsuwan",
     "Tipsuwan, Chow: Model Predictive Path Tracking via Middleware for Networked Mobile Robot over IP Network",
     (
-        PaperPart.single("Gain", gain.work),
+        PaperPart("Gain", gain.work),
         PaperPart("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
         PaperPart("Success", success.work, success.conclude, success.CASES),
         PaperPart("Shorter paths", success.work_shorter, success.conclude_shorter, success.SHORTER_CASES),

@@ -133,8 +133,7 @@ def _figure(found: dict[str, dict[float, tuple[str, ...]]]) -> Figure:
                     ax.text(k, i, said(cell), ha="center", va="center", fontsize=5.5, color=INK)
             ax.set_xticks(range(len(TAUS)), [f"{tau:g}" for tau in TAUS], fontsize=6.5)
             ax.set_yticks(range(len(values)), [f"{value:g}" for value in values], fontsize=7.0)
-            ax.set_xlabel("median round trip [s]")
-            ax.set_title(NAMES[axis])
+            ax.set(xlabel="median round trip [s]", title=NAMES[axis])
             ax.grid(visible=False)
         canvas.supxlabel(LETTERS, fontsize=7.0)
 

@@ -84,7 +84,7 @@ class PredictiveController:
         if isinstance(message, Echo):
             self._traffic.receive(message, now=now)
             return None
-        tau = self._traffic.median
+        tau = self._traffic.delays.median
         if message.number <= self._heard or tau is None:
             return None
         self._heard = message.number

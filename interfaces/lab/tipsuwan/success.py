@@ -205,11 +205,8 @@ def success_figure(robot: str, tracks: dict[str, DriveTrace]) -> Figure:
             left.plot(*track.postures[:, :2].T, color=COLOURS[name], label=name, linewidth=1.1)
             right.plot(EVERY * np.arange(len(away)), away, color=COLOURS[name], label=name, linewidth=1.1)
         left.set_aspect("equal", adjustable="datalim")
-        left.set_xlabel("x [m]")
-        left.set_ylabel("y [m]")
-        right.set_xlabel("time [s]")
-        right.set_ylabel("distance from the path [cm]")
-        right.set_ylim(bottom=0)
+        left.set(xlabel="x [m]", ylabel="y [m]")
+        right.set(xlabel="time [s]", ylabel="distance from the path [cm]", ylim=(0, None))
         legend(left, place="lower left")
 
     return draw(f"fig7_{robot}", f"{robot}: an S path over a network, Fig. 7", paint, height=3.4)

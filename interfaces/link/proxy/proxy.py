@@ -110,8 +110,6 @@ class Proxy:
         self.tcp: TcpProxy | None = None
         """TCP's part, once it has been started and if the settings ask for it."""
         self.udp: UdpProxy | None = None
-        self._ways: tuple[ProxyDirection, ProxyDirection] | None = None
-        self._channels: tuple[Channel[Parcel], Channel[Parcel]] | None = None
         self.listening = settings.listen
         """Where it really listens, once it has been started."""
 
@@ -130,11 +128,10 @@ class Proxy:
                 Channel[Parcel](replace(conditions, service=Service.DATAGRAM), self._spare, path=path)
                 for conditions, path in zip(both, self._paths, strict=True)
             )
-            self._channels = (there, back)
             self.udp = UdpProxy(
                 udp,
                 (family, target),
-                self._channels,
+                (there, back),
                 self._clock,
                 self._lateness,
                 most=settings.most_clients,
@@ -146,16 +143,14 @@ class Proxy:
                 ProxyDirection(conditions, path, self._spare)
                 for conditions, path in zip(both, self._paths, strict=True)
             )
-            self._ways = (forward, backward)
-            self.tcp = TcpProxy(target[:2], self._ways, self._clock, self._lateness, settings.most_clients)
+            self.tcp = TcpProxy(target[:2], (forward, backward), self._clock, self._lateness, settings.most_clients)
             await self.tcp.start(tcp)
 
     def close(self) -> None:
         """Stop listening, end every connection, drop what is on its way."""
-        if self.tcp is not None:
-            self.tcp.close()
-        if self.udp is not None:
-            self.udp.close()
+        for part in (self.tcp, self.udp):
+            if part is not None:
+                part.close()
 
     def statistics(self) -> dict[str, Any]:
         """What happened so far, ready for JSON; times in seconds."""
@@ -173,12 +168,10 @@ class Proxy:
                 "late_max_s": self._lateness.worst if self._lateness.count else None,
             },
         }
-        if self.tcp is not None and self._ways is not None:
-            logs = [_totals(way.log.totals()) for way in self._ways]
-            value["tcp"] = {**asdict(self.tcp.counts), "forward": logs[0], "backward": logs[1]}
-        if self.udp is not None and self._channels is not None:
-            logs = [_totals(channel.log.totals()) for channel in self._channels]
-            value["udp"] = {**asdict(self.udp.counts), "forward": logs[0], "backward": logs[1]}
+        for name, part in (("tcp", self.tcp), ("udp", self.udp)):
+            if part is not None:
+                forward, backward = (_totals(way.log.totals()) for way in part.ways)
+                value[name] = {**asdict(part.counts), "forward": forward, "backward": backward}
         return value
 
     async def _bind(self) -> tuple[socket.socket | None, socket.socket | None]:

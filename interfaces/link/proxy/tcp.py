@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interfaces.link.conditions import Conditions, LinkPath, Service
-from interfaces.link.link import Stream
+from interfaces.link.link import Channel
 from interfaces.link.packets import PacketLog
 from interfaces.timer import Timer, TimerLateness
 from vrs.clock import Clock
@@ -58,9 +58,9 @@ class ProxyDirection:
         self._path, self._rng = path, rng
         self.log = PacketLog(keep=1)
 
-    def stream(self) -> Stream[bytes | _Mark]:
+    def stream(self) -> Channel[bytes | _Mark]:
         """A stream for one direction of one connection."""
-        return Stream(self._conditions, self._rng, path=self._path, log=self.log)
+        return Channel(self._conditions, self._rng, path=self._path, log=self.log)
 
 
 class TcpProxy:
@@ -113,27 +113,20 @@ class TcpProxy:
 
 
 class _ProxiedConnection:
-    """Two sockets and the two flows between them."""
+    """Two sockets and the two streams between them."""
 
     def __init__(self, proxy: TcpProxy) -> None:
         self._proxy = proxy
-        self.client, self.server = _End(self), _End(self)
-        there, back = (way.stream() for way in proxy.ways)
-        self._flows = (
-            _Flow(there, self.client, self.server, proxy), _Flow(back, self.server, self.client, proxy)
-        )  # fmt: skip
-        self.client.out, self.server.out = self._flows
-        self.client.into, self.server.into = self._flows[1], self._flows[0]
+        self.client, self.server = (_End(self, way.stream(), proxy) for way in proxy.ways)
+        self.client.peer, self.server.peer = self.server, self.client
         self._connecting: asyncio.Task[None] | None = None
 
     def opened(self, end: _End) -> None:
         """Make the connection to the server as soon as the client's stands; nothing is read before."""
         if end is self.client:
-            end.hold()
             self._connecting = asyncio.get_running_loop().create_task(self._connect())
-        else:
-            for flow in self._flows:
-                flow.throttle()
+        end.throttle()
+        end.peer.throttle()
 
     async def _connect(self) -> None:
         host, port = self._proxy.target
@@ -163,77 +156,24 @@ class _ProxiedConnection:
         self._forget()
 
     def _forget(self) -> None:
-        for flow in self._flows:
-            flow.stop()
+        self.client.stop()
+        self.server.stop()
         self._proxy.connections.discard(self)
 
 
-class _Flow:
-    """One direction of one connection."""
-
-    def __init__(self, stream: Stream[bytes | _Mark], source: _End, sink: _End, proxy: TcpProxy) -> None:
-        self._stream, self._source, self._sink, self._clock = stream, source, sink, proxy.clock
-        self._timer = Timer(proxy.clock, self.pump, proxy.lateness)
-        self.bytes_in_flight = 0
-        """Sent and not yet handed to the sink."""
-        self._stopped = False
-
-    def feed(self, data: bytes) -> None:
-        """Send bytes that the source has given."""
-        for start in range(0, len(data), SEGMENT):
-            self._send(data[start : start + SEGMENT])
-        self.pump()
-
-    def end(self, mark: _Mark) -> None:
-        """Send word that the source has ended."""
-        self._send(mark)
-        self.pump()
-
-    def _send(self, payload: bytes | _Mark) -> None:
-        size = len(payload) if isinstance(payload, bytes) else 0
-        self.bytes_in_flight += size
-        self._stream.send(payload, self._clock.now(), size)
-
-    def pump(self) -> None:
-        """Hand the sink what has arrived, and wait for the next."""
-        if self._stopped:
-            return
-        for delivery in self._stream.receive(self._clock.now()):
-            if isinstance(delivery.payload, bytes):
-                self.bytes_in_flight -= len(delivery.payload)
-            self._sink.take(delivery.payload)
-        if self._stream.lost and not self._stopped:
-            self._sink.connection.broken()
-        if not self._stopped:
-            self._timer.set(self._stream.next_deadline())
-            self.throttle()
-
-    def throttle(self) -> None:
-        """Let the source wait while too much is on its way, or the sink doesn't read."""
-        full = self.bytes_in_flight >= WINDOW_BYTES or self._stream.in_flight() >= WINDOW_PACKETS
-        if full or self._sink.blocked or not self._sink.open:
-            self._source.hold()
-        else:
-            self._source.go_on()
-
-    def stop(self) -> None:
-        """Drop what is on its way."""
-        self._stopped = True
-        self._timer.set(None)
-
-
 class _End(asyncio.Protocol):
-    """One socket of a connection."""
+    """One socket of a connection, and the stream of what is read from it to the other one."""
 
-    out: _Flow
-    """What it reads goes here."""
-    into: _Flow
-    """What comes from here it writes."""
+    peer: _End
+    """The other socket."""
 
-    def __init__(self, connection: _ProxiedConnection) -> None:
-        self.connection = connection
+    def __init__(self, connection: _ProxiedConnection, stream: Channel[bytes | _Mark], proxy: TcpProxy) -> None:
+        self._connection, self._stream, self._clock = connection, stream, proxy.clock
+        self._timer = Timer(proxy.clock, self._pump, proxy.lateness)
+        self.bytes_in_flight = 0
+        """Read and not yet handed to the peer."""
         self.unwanted = self.open = self.gone = self.blocked = False
-        self._heard_end = self._said_end = False
+        self._heard_end = self._said_end = self._stopped = False
         self.transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -243,16 +183,16 @@ class _End(asyncio.Protocol):
         if self.unwanted:
             self.reset()
         else:
-            self.connection.opened(self)
+            self._connection.opened(self)
 
     def data_received(self, data: bytes) -> None:
         """Pass bytes on."""
-        self.out.feed(data)
+        self._send(*(data[start : start + SEGMENT] for start in range(0, len(data), SEGMENT)))
 
     def eof_received(self) -> bool:
-        """Pass on that the peer has closed its half; ours stays open."""
+        """Pass on that whoever is there has closed its half; ours stays open."""
         self._heard_end = True
-        self.out.end(_Mark.END)
+        self._send(_Mark.END)
         self._close_when_done()
         return True
 
@@ -260,24 +200,55 @@ class _End(asyncio.Protocol):
         """Pass on a reset; anything else has been passed on before."""
         self.open, self.gone = False, True
         if exc is not None and not self.unwanted and not (self._heard_end and self._said_end):
-            self.out.end(_Mark.ABORT)
+            self._send(_Mark.ABORT)
         else:
-            self.connection.closed()
+            self._connection.closed()
 
     def pause_writing(self) -> None:
-        """The peer doesn't read: what feeds us waits."""
+        """Whoever is there doesn't read: what feeds it waits."""
         self.blocked = True
-        self.into.throttle()
+        self.peer.throttle()
 
     def resume_writing(self) -> None:
-        """The peer reads again."""
+        """Whoever is there reads again."""
         self.blocked = False
-        self.into.throttle()
+        self.peer.throttle()
+
+    def _send(self, *payloads: bytes | _Mark) -> None:
+        for payload in payloads:
+            size = len(payload) if isinstance(payload, bytes) else 0
+            self.bytes_in_flight += size
+            self._stream.send(payload, self._clock.now(), size)
+        self._pump()
+
+    def _pump(self) -> None:
+        """Hand the peer what has arrived, and wait for the next."""
+        if self._stopped:
+            return
+        for delivery in self._stream.receive(self._clock.now()):
+            if isinstance(delivery.payload, bytes):
+                self.bytes_in_flight -= len(delivery.payload)
+            self.peer.take(delivery.payload)
+        if self._stream.lost and not self._stopped:
+            self._connection.broken()
+        if not self._stopped:
+            self._timer.set(self._stream.next_deadline())
+            self.throttle()
+
+    def throttle(self) -> None:
+        """Read, or wait while too much is on its way or the peer takes nothing; nothing is read after the end."""
+        if not self.open or self._heard_end or self.transport is None:
+            return
+        full = self.bytes_in_flight >= WINDOW_BYTES or self._stream.in_flight() >= WINDOW_PACKETS
+        if full or self.peer.blocked or not self.peer.open:
+            self.transport.pause_reading()
+        else:
+            self.transport.resume_reading()
 
     def take(self, payload: bytes | _Mark) -> None:
         """Write bytes, or do what a mark says; a closed socket ignores bytes."""
         if payload is _Mark.ABORT:
-            self.connection.broken()
+            self._connection.broken()
         elif self.open and self.transport is not None:
             if isinstance(payload, bytes):
                 self.transport.write(payload)
@@ -287,18 +258,8 @@ class _End(asyncio.Protocol):
                     self.transport.write_eof()
                 self._close_when_done()
 
-    def hold(self) -> None:
-        """Read no more for now."""
-        if self.open and not self._heard_end and self.transport is not None:
-            self.transport.pause_reading()
-
-    def go_on(self) -> None:
-        """Read again; at the end there is nothing more to read."""
-        if self.open and not self._heard_end and self.transport is not None:
-            self.transport.resume_reading()
-
     def reset(self) -> None:
-        """Close so that the peer sees a reset."""
+        """Close so that whoever is there sees a reset."""
         if self.transport is not None and not self.gone:
             self.open = False
             sock = self.transport.get_extra_info("socket")
@@ -306,6 +267,11 @@ class _End(asyncio.Protocol):
                 sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             self.transport.abort()
         self.unwanted = True
+
+    def stop(self) -> None:
+        """Drop what is on its way."""
+        self._stopped = True
+        self._timer.set(None)
 
     def _close_when_done(self) -> None:
         if self._heard_end and self._said_end and self.transport is not None:

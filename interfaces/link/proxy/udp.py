@@ -77,7 +77,7 @@ class UdpProxy:
         idle: float,
     ) -> None:
         self._listener, self._target, self._clock = listener, target, clock
-        self._there, self._back = channels
+        self.ways = self._there, self._back = channels
         self._most, self._idle = most, idle
         self._clients: dict[SocketAddress, _ProxyClient] = {}
         self._held = {id(channel): 0 for channel in channels}

@@ -7,9 +7,9 @@ import keyword
 import math
 import re
 import struct
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Final, TypeAlias
+from collections.abc import Iterable, Iterator
+from dataclasses import MISSING, dataclass, fields
+from typing import Annotated, Any, Final, TypeAlias, get_args
 
 from vrs.checks import finite, integer_in, validated, within
 from vrs.errors import InvalidValueError
@@ -43,6 +43,11 @@ class Scalar(enum.StrEnum):
     def size(self) -> int:
         """[byte]."""
         return int(self.value[1:]) // 8
+
+    @property
+    def whole(self) -> bool:
+        """Whether values are integers."""
+        return self is not Scalar.F32
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -134,6 +139,10 @@ class _Valued(_Named):
     def format(self) -> struct.Struct:
         """Of its values on the wire."""
         return struct.Struct(f"!{self.count}{self.type.code}")
+
+    def pack(self, values: Iterable[float]) -> bytes:
+        """Values as they are on the wire."""
+        return self.format.pack(*(map(int, values) if self.type.whole else values))
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,16 +251,17 @@ class MemoryEvent(_Stored):
 
 
 Element: TypeAlias = Effector | Sensor | Monitor | Command | Module | Event | MemoryCommand | MemoryEvent
-KINDS: Final[tuple[type[Element], ...]] = (
-    Effector,
-    Sensor,
-    Monitor,
-    Command,
-    Module,
-    Event,
-    MemoryCommand,
-    MemoryEvent,
-)
+KINDS: Final[tuple[type[Element], ...]] = get_args(Element)
+
+
+def stated(element: Element) -> Iterator[tuple[str, Any]]:
+    """Fields of an element that aren't at their defaults, by name; an effector's limits are its type's then."""
+    for item in fields(element):
+        default, value = item.default, getattr(element, item.name)
+        if isinstance(element, Effector) and item.name in ("low", "high"):
+            default = element.type.bounds[item.name == "high"]
+        if default is MISSING or value != default:
+            yield item.name, value
 
 
 MOST_ELEMENTS: Final = 1024

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -18,7 +18,6 @@ from xml.parsers import expat
 from interfaces.rsp.model.elements import (
     KINDS,
     MOST_ELEMENTS,
-    Effector,
     Element,
     Filling,
     Module,
@@ -26,6 +25,7 @@ from interfaces.rsp.model.elements import (
     OnLoss,
     RobotModel,
     Scalar,
+    stated,
 )
 from interfaces.system import read_within
 from vrs.errors import FormatError, InvalidValueError
@@ -129,19 +129,11 @@ def _place(stream: BytesIO) -> Any:
 
 def _fill(node: Any, element: Element, package: Any) -> None:
     """Set those attributes of a node that aren't at their defaults."""
-    for item in fields(element):
-        value = getattr(element, item.name)
-        if item.name in ("effector", "members"):
-            continue
-        if item.name in ("low", "high"):
-            assert isinstance(element, Effector)
-            if value == element.type.bounds[item.name == "high"]:
-                continue
-        elif item.default is not MISSING and value == item.default:
-            continue
-        if item.name in _ENUMS:
-            value = package.getEClassifier(_ENUMS[item.name]).getEEnumLiteral(value.value)
-        setattr(node, item.name, value)
+    for name, value in stated(element):
+        if name in _ENUMS:
+            setattr(node, name, package.getEClassifier(_ENUMS[name]).getEEnumLiteral(value.value))
+        elif name not in ("effector", "members"):
+            setattr(node, name, value)
 
 
 def _look_through(data: bytes, where: str) -> None:

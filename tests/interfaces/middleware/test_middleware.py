@@ -56,8 +56,8 @@ def test_probes_go_out_every_5_ms_and_ten_round_trips_count():
     assert middleware.config.probing.window.capacity == 10
     middleware = GainSchedulingMiddleware(Seen())
     now = probed(middleware, [9.0 - 4.9] * 3 + [0.1, 0.1, 0.1, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.5])
-    assert middleware.traffic.median == pytest.approx(0.15)
-    assert middleware.traffic.mean == pytest.approx(0.2)
+    assert middleware.traffic.delays.median == pytest.approx(0.15)
+    assert middleware.traffic.delays.mean == pytest.approx(0.2)
     assert now > 0
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.cli.replay import begin_shown
+from interfaces.cli.replay import PlaybackStart, begin_shown
 from interfaces.recording.playback import Mode, Playback
 from interfaces.recording.recording import open_recording
 from tests.interfaces.recording.made import make
@@ -80,7 +80,7 @@ def test_a_page_begins_as_asked_and_an_instant_alone_stands(made, at, rate, span
         playback = Playback([recording])
         if at is not None:
             playback.seek(at, now=0.0)
-        begin_shown(playback, at, rate, span, now=10.0)
+        begin_shown(playback, PlaybackStart(at, rate, span), now=10.0)
         assert playback.mode is mode
         assert playback.place(now=11.0) == pytest.approx(later)
 
@@ -97,7 +97,7 @@ def test_a_page_of_what_is_being_written_is_live_unless_asked_otherwise(made, tm
         assert playback.growing
         if at is not None:
             playback.seek(at, now=0.0)
-        begin_shown(playback, at, None, None, now=1.0)
+        begin_shown(playback, PlaybackStart(at), now=1.0)
         assert playback.mode in modes
 
 

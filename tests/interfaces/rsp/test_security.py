@@ -276,17 +276,6 @@ def test_keys_of_a_session_are_its_own() -> None:
     assert len({key for pair in made for key in pair}) == 8
 
 
-def test_the_derivation_is_hkdf() -> None:
-    from cryptography.hazmat.primitives.hashes import SHA256
-    from cryptography.hazmat.primitives.kdf.hkdf import HKDF
-
-    from interfaces.rsp.session import hkdf
-
-    for length in (16, 32, 64, 70):
-        theirs = HKDF(SHA256(), length, b"salt", b"info").derive(b"secret" * 9)
-        assert hkdf(b"secret" * 9, b"salt", b"info", length) == theirs
-
-
 def asked(robot: RobotCore, question: Open, address: bytes, now: float, keys: Keyring | None = None) -> list:
     """What a robot answers to an OPEN: type, address, session and body of each."""
     head = header.Header(MODEL.id, False, PacketType.OPEN, 0, 0, 0, 65_535, 0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robots.cubo import parameters as p
-from robots.cubo.body import COMMANDS, EVENTS, MEASURES, MOVES, CuboBody
+from robots.cubo.body import COMMANDS, MEASURES, MOVES, CuboBody
 from robots.cubo.shapes import shapes
 from robots.mobile.body import DRIVES
 from robots.mobile.chassis import MobileReality
@@ -184,7 +184,6 @@ def test_commands_buttons_and_bindings() -> None:
                 call()
         assert all(body.measure(binding) is not None for binding in MEASURES)
         assert body.measure("nothing") is None
-        assert {"bumper", "button.service"} <= set(EVENTS)
         assert "ir" in COMMANDS
         assert "tilt" in MOVES
 

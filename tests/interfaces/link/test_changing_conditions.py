@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from interfaces.link import (
     BernoulliLoss,
+    Channel,
     Conditions,
     ConstantDelay,
     Gauge,
     GilbertElliottLoss,
-    Lane,
     Link,
     LinkConditions,
     PacketRecord,
@@ -37,24 +37,24 @@ steps = st.lists(st.tuples(st.floats(0, 2), st.none() | serviced), min_size=1, m
 
 def run(first, steps, seed, looks):
     """Send a packet or change the conditions after each gap; what came out, and how each packet was sent."""
-    lane = Lane(first, np.random.default_rng(seed))
+    channel = Channel(first, np.random.default_rng(seed))
     now, out, sent = 0.0, [], []
     for gap, change in steps:
         now += gap
         if looks:
-            while (deadline := lane.next_deadline()) is not None and deadline <= now:
-                out += lane.receive(deadline)
+            while (deadline := channel.next_deadline()) is not None and deadline <= now:
+                out += channel.receive(deadline)
         if change is None:
             number = len(sent)
-            sent.append((now, lane.conditions.service, lane.send(number, now)))
+            sent.append((now, channel.conditions.service, channel.send(number, now)))
         else:
-            lane.change(change, now)
-        conserved(lane)
-    while (deadline := lane.next_deadline()) is not None:
+            channel.change(change, now)
+        conserved(channel)
+    while (deadline := channel.next_deadline()) is not None:
         now = max(now, deadline)
-        out += lane.receive(now)
-        conserved(lane)
-    return out, sent, lane.log.take()
+        out += channel.receive(now)
+        conserved(channel)
+    return out, sent, channel.log.take()
 
 
 @settings(max_examples=200, deadline=None)
@@ -95,31 +95,31 @@ def test_it_depends_on_the_seed_and_the_instants_alone(first, steps, seed):
 def test_a_shorter_way_overtakes_only_where_it_may():
     slow, quick = ConstantDelay("slow", 1.0), ConstantDelay("quick", 0.1)
     for service, expected in ((DATAGRAM, [1, 0]), (IN_ORDER, [0, 1])):
-        lane = Lane(Conditions(delay=slow, service=service), np.random.default_rng(0))
-        assert lane.send(0, 0.0) == 1.0
-        lane.change(Conditions(delay=quick, service=service), 0.2)
-        assert lane.send(1, 0.3) == (0.4 if service is DATAGRAM else 1.0)
-        assert [item.payload for t in (0.5, 1.0) for item in lane.receive(t)] == expected
+        channel = Channel(Conditions(delay=slow, service=service), np.random.default_rng(0))
+        assert channel.send(0, 0.0) == 1.0
+        channel.change(Conditions(delay=quick, service=service), 0.2)
+        assert channel.send(1, 0.3) == (0.4 if service is DATAGRAM else 1.0)
+        assert [item.payload for t in (0.5, 1.0) for item in channel.receive(t)] == expected
 
 
 def test_a_packet_lost_before_meets_the_conditions_of_its_next_attempt():
-    lane = Lane(Conditions(loss=BernoulliLoss(1.0), service=IN_ORDER), np.random.default_rng(0))
-    assert lane.send("a", 0.0) is None
+    channel = Channel(Conditions(loss=BernoulliLoss(1.0), service=IN_ORDER), np.random.default_rng(0))
+    assert channel.send("a", 0.0) is None
     # Its second attempt, at 1 s, was lost as well, though nobody looked.
-    lane.change(Conditions(delay=ConstantDelay("c", 0.5), service=IN_ORDER), 2.0)
-    assert lane.send("b", 2.0) is None
-    assert [(item.payload, item.arrived) for item in lane.receive(9.0)] == [("a", 3.5), ("b", 3.5)]
-    assert lane.log.totals().resent == 2
+    channel.change(Conditions(delay=ConstantDelay("c", 0.5), service=IN_ORDER), 2.0)
+    assert channel.send("b", 2.0) is None
+    assert [(item.payload, item.arrived) for item in channel.receive(9.0)] == [("a", 3.5), ("b", 3.5)]
+    assert channel.log.totals().resent == 2
 
 
 def test_what_isn_t_changed_goes_on_as_if_nothing_had_been():
-    one, other = (Lane(Conditions(delay=delay_profile("thu")), np.random.default_rng(8)) for _ in range(2))
+    one, other = (Channel(Conditions(delay=delay_profile("thu")), np.random.default_rng(8)) for _ in range(2))
     arrivals = []
-    for lane, share in ((one, 0.0), (other, 0.5)):
-        arrivals.append([lane.send(k, 0.1 * k) for k in range(50)])
+    for channel, share in ((one, 0.0), (other, 0.5)):
+        arrivals.append([channel.send(k, 0.1 * k) for k in range(50)])
         if share:
-            lane.change(Conditions(delay=delay_profile("thu"), loss=BernoulliLoss(share)), 5.0)
-        arrivals[-1] += [lane.send(k, 0.1 * k) for k in range(50, 100)]
+            channel.change(Conditions(delay=delay_profile("thu"), loss=BernoulliLoss(share)), 5.0)
+        arrivals[-1] += [channel.send(k, 0.1 * k) for k in range(50, 100)]
     kept = [(a, b) for a, b in zip(*arrivals, strict=True) if b is not None]
     assert 60 < len(kept) < 90
     assert all(a == b for a, b in kept)
