@@ -3,7 +3,7 @@ FROM python:3.11-slim-bookworm
 
 RUN useradd --create-home --uid 1000 vrs && mkdir /data && chown vrs:vrs /data
 WORKDIR /opt/vrs-teleop
-COPY pyproject.toml constraints.txt README.md LICENSE THIRD_PARTY.md ./
+COPY pyproject.toml constraints.txt README.md LICENSE LICENSE-APACHE-2.0 THIRD_PARTY.md ./
 COPY vrs vrs
 COPY robots robots
 COPY interfaces interfaces

@@ -1,4 +1,4 @@
-"""The operator station: many pages at once, how long a page's thread is held up, whether its memory stays flat.
+"""The operator station: how soon a page is there, many at once, how long a page's thread is held up, its memory.
 
 `python -m benchmarks station`; VRS_STATION_MINUTES: how long a page is open (30), VRS_STATION_PARTS: its parts.
 Pages are other processes on the same machine: one in Chromium, the others as a server sees them (`visitors`).
@@ -28,9 +28,10 @@ from vrs import Insertion, JointTarget, MotionCommand, Receipt
 from vrs.model import Array
 
 MINUTES = float(os.environ.get("VRS_STATION_MINUTES", "30"))
-PARTS = os.environ.get("VRS_STATION_PARTS", "pages tasks memory").split()
+PARTS = os.environ.get("VRS_STATION_PARTS", "load pages tasks memory").split()
 PAGES = 30
 SECONDS = 20.0
+LOADS = 7
 VISITORS = Path(__file__).with_name("visitors.py")
 FLAGS = (
     "--no-sandbox", "--disable-quic", "--disable-background-networking", "--disable-component-update",
@@ -44,9 +45,22 @@ _TURNS = """() => { const rows = window.turns ??= [];
 const look = () => { const { elements } = station.shared.pane.scene.node('vrs', 'virtual', 'body', '1').matrix;
 rows.push([station.session.now, Math.atan2(elements[1], elements[0])]); requestAnimationFrame(look); };
 requestAnimationFrame(look); }"""
+_LOADED = """() => { const parts = performance.getEntriesByType("resource");
+const [page] = performance.getEntriesByType("navigation");
+const painted = performance.getEntriesByName("first-contentful-paint")[0];
+return [painted.startTime / 1e3, Math.max(...parts.map((one) => one.responseEnd)) / 1e3,
+    parts.reduce((sum, one) => sum + one.transferSize, page.transferSize), parts.length + 1]; }"""
 _TASKS = """() => { window.held = []; new PerformanceObserver((list) => { for (const entry of list.getEntries())
 for (const { duration, sourceURL, invoker } of entry.scripts) held.push([duration, sourceURL, invoker]);
 }).observe({ type: 'long-animation-frame', buffered: true }); }"""
+
+
+def holds(page: Any, expression: str) -> None:
+    """Wait until something is so in a page, whose policy doesn't allow Playwright's own waiting."""
+    end = time.monotonic() + 60.0
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, expression
+        time.sleep(0.02)
 
 
 @contextlib.contextmanager
@@ -58,8 +72,8 @@ def browser_page(url: str) -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(url)
-        page.wait_for_function(READY, timeout=60_000)
-        page.wait_for_function("station.session.state !== null", timeout=60_000)
+        holds(page, READY)
+        holds(page, "station.session.state !== null")
         yield page
         browser.close()
 
@@ -84,6 +98,26 @@ def frames_of(process: subprocess.Popen[str]) -> list[list[tuple[float, float]]]
     process.stdin.flush()
     found: list[list[tuple[float, float]]] = json.loads(process.stdout.readline())
     return found
+
+
+def load() -> None:
+    """How much a page that nobody has seen yet loads, and how soon something of it is seen, and it's live."""
+    from playwright.sync_api import sync_playwright
+
+    with served(*HOLD) as (port, _), sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=list(FLAGS))
+        rows = []
+        for _ in range(LOADS + 1):
+            page = browser.new_page(viewport={"width": 1280, "height": 720})
+            page.goto(f"http://127.0.0.1:{port}/")
+            holds(page, READY)
+            rows.append([page.evaluate("performance.now()") / 1e3, *page.evaluate(_LOADED)])
+            page.close()
+        browser.close()
+    # The first one comes while the robot does.
+    live, painted, ready, size, files = np.median(np.array(rows[1:]), axis=0)
+    print(f"a page: {size / 1e3:.0f} kB in {files:.0f} files; load {os.getloadavg()[0]:.1f}")
+    print(f"    first paint after {painted:.2f} s, all of it there after {ready:.2f} s, live after {live:.2f} s")
 
 
 class Arm:
@@ -222,7 +256,7 @@ def use(page: Any, seconds: float) -> None:
     """Do something with a page every second."""
     if not page.evaluate("station.session.holds"):
         page.click("#take")
-        page.wait_for_function("station.session.holds")
+        holds(page, "station.session.holds")
         page.select_option("#when", "append")
     end, turn = time.monotonic() + seconds, 0
     while time.monotonic() < end:
@@ -271,7 +305,7 @@ def memory() -> None:
 def main() -> None:
     """Run what VRS_STATION_PARTS names."""
     for name in PARTS:
-        {"pages": pages, "tasks": tasks, "memory": memory}[name]()
+        {"load": load, "pages": pages, "tasks": tasks, "memory": memory}[name]()
 
 
 if __name__ == "__main__":

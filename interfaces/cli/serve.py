@@ -332,7 +332,7 @@ async def _serve(serving: _Serving, access: Access) -> None:
             room = served_room(client, operator.twins.operator, val.files, software())
             routes.append(PageTerminalServer(room, access).route)
         app = application([*routes, *station.routes], serving.allowed(port))
-        for part in (station.running(), sockets.serve(app, listening), *parts):
+        for part in (sockets.serve(app, listening), *parts):
             await stack.enter_async_context(part)
         keep_quiet()
         tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))

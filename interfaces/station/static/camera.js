@@ -1,6 +1,6 @@
 // What the robot sees, says and shows: its camera's picture and sound by RTP, or single pictures, and both its axes.
 import { Gaze } from "./gaze.js";
-import { DEGREES, h, icon, mark, write } from "./dom.js";
+import { DEGREES, draw, h, icon, mark, write } from "./dom.js";
 import { held, needs } from "./handling.js";
 import { Receiver } from "./receiver.js";
 import { sideLink } from "./sidelink.js";
@@ -84,7 +84,7 @@ export function mount(station, box) {
   function listen() {
     video.muted = !video.muted;
     mark(sound, "aria-pressed", String(!video.muted));
-    write(sound.firstChild, video.muted ? "volume_off" : "volume_up");
+    draw(sound.firstChild, video.muted ? "volume_off" : "volume_up");
     write(sound.lastChild, video.muted ? "Sound on" : "Sound off");
     look();
   }

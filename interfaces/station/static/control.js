@@ -1,9 +1,9 @@
 // Who has control: shown always; asked for, given back and taken over by buttons.
-import { h, icon, mark, write } from "./dom.js";
+import { draw, h, icon, mark, write } from "./dom.js";
 
 export function mount(station, box) {
   const session = station.session;
-  const symbol = icon("");
+  const symbol = icon("help");
   const words = h("span");
   const pill = h("span.pill", { id: "control-pill", role: "status" }, symbol, words);
   const take = button("take", "Take control", () => ask("acquire"));
@@ -64,7 +64,7 @@ export function mount(station, box) {
             ? ["warn", "hourglass_top", "The robot comes to rest"]
             : ["none", "lock_open", role === "viewer" ? "You watch" : "Nobody has control"];
     mark(pill, "data-tone", tone);
-    write(symbol, name);
+    draw(symbol, name);
     write(words, text);
     take.hidden = !(live && session.mayCommand && lease.state === "free");
     give.hidden = !(live && session.holds);

@@ -1,4 +1,5 @@
 // Elements, and numbers as people read them.
+import { OUTLINES } from "./icons.js";
 
 /**
  * An element.
@@ -19,9 +20,22 @@ export function h(tag, props = {}, ...children) {
   return element;
 }
 
-/** A symbol of the icon font; people hear and read the words beside it. */
+const SVG = "http://www.w3.org/2000/svg";
+
+/** A symbol by its name in `OUTLINES`; people hear and read the words beside it. */
 export function icon(name) {
-  return h("i.material-icons", { "aria-hidden": "true" }, name);
+  const symbol = document.createElementNS(SVG, "svg");
+  symbol.setAttribute("class", "icon");
+  symbol.setAttribute("viewBox", "0 0 24 24");
+  symbol.setAttribute("aria-hidden", "true");
+  symbol.append(document.createElementNS(SVG, "path"));
+  draw(symbol, name);
+  return symbol;
+}
+
+/** Let a symbol be another one, but touch nothing if it's that already. */
+export function draw(symbol, name) {
+  mark(symbol.firstChild, "d", OUTLINES[name]);
 }
 
 /** Write a text, but touch nothing if it's there already. */

@@ -1,5 +1,5 @@
 // How the connection is, and how the real robot is: two pills, each with a word and a symbol.
-import { h, icon, mark, write } from "./dom.js";
+import { draw, h, icon, mark, write } from "./dom.js";
 import { busy } from "./tasks.js";
 
 const WORDS = {
@@ -14,14 +14,14 @@ const WORDS = {
 const TONES = { live: "good", connecting: "warn", stale: "warn", lost: "bad", locked: "warn" };
 
 function pill(id, title) {
-  const symbol = icon("");
+  const symbol = icon("sync");
   const words = h("span");
   const element = h("span.pill", { id, title, role: "status" }, symbol, words);
   return {
     element,
     show(tone, name, text) {
       mark(element, "data-tone", tone);
-      write(symbol, name);
+      draw(symbol, name);
       write(words, text);
     },
   };

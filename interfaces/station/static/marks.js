@@ -1,5 +1,5 @@
 // The strip's scale, and marks of what happened.
-import { clockText, h } from "./dom.js";
+import { clockText, h, icon } from "./dom.js";
 
 /** Marks that are kept [number]. */
 const KEPT = 200;
@@ -59,7 +59,7 @@ export class Marks {
     }
     for (const { t, symbol, text, tone } of this.events) {
       if (t < from || t > until) continue;
-      const event = h("i.material-icons.event", { title: `${clockText(t)} ${text}`, "data-tone": tone }, symbol);
+      const event = h("i.event", { title: `${clockText(t)} ${text}`, "data-tone": tone }, icon(symbol));
       event.style.left = `${this.view.left(t).toFixed(1)}px`;
       parts.push(event);
     }

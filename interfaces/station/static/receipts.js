@@ -1,5 +1,5 @@
 // What became of the commands that were given here, the newest first; a command's receipt changes with later ones.
-import { clockText, h, icon, write } from "./dom.js";
+import { clockText, draw, h, icon, write } from "./dom.js";
 
 const MOST = 60;
 const TONES = { accepted: "good", postponed: "warn", rejected: "bad", undone: "none", refused: "bad", pending: "none" };
@@ -71,7 +71,7 @@ export function mount(station, box) {
     const receipt = entry.outcome?.receipt;
     parts.element.dataset.status = status;
     parts.element.dataset.tone = TONES[status] ?? "none";
-    write(parts.symbol, SYMBOLS[status] ?? "help");
+    draw(parts.symbol, SYMBOLS[status] ?? "help");
     const id = receipt?.command_id ?? entry.command?.command_id;
     const number = id ? `#${id} ` : "";
     write(parts.what, number + describe(entry));
@@ -86,7 +86,7 @@ export function mount(station, box) {
       const parts = row();
       steers = { parts, at: entry.at, first: entry.at, count: 0, missed: 0 };
       parts.element.dataset.tone = "good";
-      write(parts.symbol, "open_with");
+      draw(parts.symbol, "open_with");
       write(parts.what, "Steering");
     }
     steers.at = entry.at;
@@ -122,7 +122,7 @@ export function mount(station, box) {
     if (status !== "refused" && status !== "rejected") return;
     row.missed += 1;
     row.parts.element.dataset.tone = "warn";
-    write(row.parts.symbol, "warning");
+    draw(row.parts.symbol, "warning");
     write(row.parts.why, `${row.missed} of ${row.count} inputs not taken: ${why}`);
   }
 }

@@ -1,5 +1,5 @@
 // Recording on the fly, and the list of recordings: replayed alone or side by side, and copied.
-import { h, icon, mark, write } from "./dom.js";
+import { draw, h, icon, mark, write } from "./dom.js";
 import { sideLink } from "./sidelink.js";
 
 const ALIGNED = [
@@ -128,7 +128,7 @@ export function mount(station, box) {
     }
     if (!now || box.offsetParent === null) return;
     mark(card, "data-failed", Boolean(failed));
-    write(symbol, failed ? "error" : "fiber_manual_record");
+    draw(symbol, failed ? "error" : "fiber_manual_record");
     write(what, failed ? "Not recording" : "Recording " + now.name);
     const dropped = now.dropped ? ` · ${now.dropped} messages left out: the disk is slow` : "";
     write(facts, failed || `since ${lengthText(now.length)} · ${sizeText(now.size)}${dropped}`);

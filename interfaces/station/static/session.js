@@ -182,19 +182,21 @@ export class Session extends EventTarget {
   }
 
   begin(welcome, now) {
-    const same = this.welcome !== null && this.welcome.instance === welcome.instance;
+    const again = this.welcome !== null;
+    if (again && this.welcome.instance !== welcome.instance) {
+      // Another server may have another robot, and other files.
+      this.wire.close();
+      location.reload();
+      return;
+    }
     this.greeted = true;
     this.tries = 0;
     this.welcome = welcome;
     this.key = welcome.session;
     this.roles = [welcome.role];
     this.orders.renew(welcome.resumed, now);
-    if (!same) {
-      this.sync = new ClockSync();
-      this.reader = this.makeReader();
-      this.state = this.network = null;
-      this.pings = 0;
-    } else if (this.reader) this.reader.number += 1;
+    if (!again) this.reader = this.makeReader();
+    else if (this.reader) this.reader.number += 1;
     for (let k = 0; k < PINGS; k++) this.ping();
     this.emit("welcome", welcome);
     this.setLease(welcome.lease);

@@ -55,19 +55,7 @@ function myName() {
   return made;
 }
 
-/** Wait for the server's part of the page. */
-function present(id) {
-  return new Promise((resolve) => {
-    const look = () => {
-      const found = document.getElementById(id);
-      if (found) resolve(found);
-      else requestAnimationFrame(look);
-    };
-    look();
-  });
-}
-
-const root = await present("strip-box").then(() => document.getElementById("station"));
+const root = document.getElementById("station");
 const config = JSON.parse(root.dataset.config);
 const station = new Station(root, config);
 window.station = station;

@@ -1,5 +1,5 @@
 // The timeline as a strip: what was to the left, what is planned to the right, and what may be changed by hand.
-import { clockText, h, icon, mark, write } from "./dom.js";
+import { clockText, draw, h, icon, mark, write } from "./dom.js";
 import { Marks } from "./marks.js";
 import { MoveBars } from "./bars.js";
 import { View } from "./timeview.js";
@@ -138,7 +138,7 @@ export function mount(station, box) {
     const old = session.link !== "live";
     mark(live, "aria-pressed", String((shared.pane.cursor ?? null) === null && !old));
     mark(live, "data-old", old ? "" : null);
-    write(live.firstChild, old ? "sensors_off" : "sensors");
+    draw(live.firstChild, old ? "sensors_off" : "sensors");
     mark(live, "title", old ? "What you see is old" : "Show what is now");
   }
 

@@ -55,7 +55,7 @@ export function mount(station, box) {
     started = true;
     say("Loading …");
     document.head.append(h("link", { rel: "stylesheet", href: "/station/xterm.css" }));
-    const { Terminal, FitAddon } = await import("./xterm.js");
+    const [{ Terminal }, { FitAddon }] = await Promise.all([import("./xterm.min.js"), import("./xterm-fit.min.js")]);
     term = new Terminal({
       convertEol: false, cursorBlink: false, fontFamily: "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace",
       fontSize: USUAL, scrollback: SCROLLBACK, screenReaderMode: true, theme: COLOURS[station.shared.theme.dark],

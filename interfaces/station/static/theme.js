@@ -1,5 +1,5 @@
 // Light or dark: as the system has it, until somebody chooses.
-import { h, icon } from "./dom.js";
+import { draw, h, icon } from "./dom.js";
 
 const KEY = "vrs-theme";
 
@@ -24,8 +24,7 @@ export function mount(station, box) {
   function show() {
     const is = dark();
     document.documentElement.dataset.theme = is ? "dark" : "light";
-    window.Quasar?.Dark.set(is);
-    symbol.textContent = is ? "light_mode" : "dark_mode";
+    draw(symbol, is ? "light_mode" : "dark_mode");
     const label = is ? "Use light colours" : "Use dark colours";
     button.setAttribute("aria-label", label);
     button.title = label;

@@ -1,5 +1,5 @@
 // What the 3D views of all robots share: the pane with its scene, a legend that hides parts, a badge, and words across.
-import { h, icon, mark, write } from "./dom.js";
+import { draw, h, icon, mark, write } from "./dom.js";
 
 const OLD = {
   stale: ["hourglass_empty", "Stale: what you see is old"],
@@ -75,7 +75,7 @@ export class Viewport {
   /** Say how the picture stands. */
   stand(status, symbol, words) {
     mark(this.badge, "data-status", status);
-    write(this.symbol, symbol);
+    draw(this.symbol, symbol);
     write(this.words, words);
   }
 

@@ -260,20 +260,21 @@ def files(page: str, package: str, scripts: Sequence[str] = ()) -> list[BaseRout
     known = own | dict.fromkeys(PARTS, "interfaces.stream")
 
     async def whole(request: Request) -> Response:
-        return _answer(request, known, f"{page}.html")
+        return await _answer(request, known, f"{page}.html")
 
     async def part(request: Request) -> Response:
-        return _answer(request, known, request.path_params["name"])
+        return await _answer(request, known, request.path_params["name"])
 
     handlers: list[tuple[str, Callable[[Request], Awaitable[Response]]]]
     handlers = [(f"/{page}", whole), (f"/{page}/{{name}}", part)]
     return [Route(path, handler) for path, handler in handlers]
 
 
-def _answer(request: Request, known: dict[str, str], name: str) -> Response:
+async def _answer(request: Request, known: dict[str, str], name: str) -> Response:
     if name not in known:
         return Response("not here", 404, HEADERS, "text/plain")
-    return _file(known[name], name).answer(request, _TYPES[name[name.rindex(".") :]], HEADERS)
+    file = await asyncio.to_thread(_file, known[name], name)
+    return file.answer(request, _TYPES[name[name.rindex(".") :]], HEADERS)
 
 
 @lru_cache(maxsize=16)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import urllib.error
+import urllib.request
 from collections.abc import AsyncIterator
 from typing import Any
 
-import httpx
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
@@ -35,10 +36,20 @@ class Site:
         self.media, self.port = media, port
         self.url = f"127.0.0.1:{port}"
 
-    async def still(self, token: str | None = VIEWER) -> httpx.Response:
+    async def still(self, token: str | None = VIEWER) -> tuple[int, str, bytes]:
+        """Ask for a single picture: status, media type and body of the answer."""
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        async with httpx.AsyncClient() as client:
-            return await client.get(f"http://{self.url}/media/still", headers=headers, timeout=30)
+        request = urllib.request.Request(f"http://{self.url}/media/still", headers=headers)
+
+        def ask() -> tuple[int, str, bytes]:
+            try:
+                with urllib.request.urlopen(request, timeout=30) as answer:
+                    return answer.status, answer.headers["Content-Type"], answer.read()
+            except urllib.error.HTTPError as refused:
+                with refused:
+                    return refused.code, refused.headers["Content-Type"], refused.read()
+
+        return await asyncio.to_thread(ask)
 
     @contextlib.asynccontextmanager
     async def page(self, token: str | None = VIEWER, origin: str | None = None) -> AsyncIterator[Page]:

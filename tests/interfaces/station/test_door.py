@@ -81,7 +81,7 @@ def test_tokens_and_a_server_that_goes_and_comes(browser: Any, tokens: tuple[Pat
         port = station(server).rstrip("/").rpartition(":")[2]
         server.process.wait(10)
         with child(*serve, "--port", port):
-            # NiceGUI loads the page anew where the server is another one.
+            # The page is loaded anew where the server is another one.
             page.settled("station.session.link === 'live' && station.session.state !== null")
             page.settled("document.getElementById('stop').dataset.waits === undefined")
             assert page.page.locator("#door[open]").count() == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import socket
 import time
 from collections.abc import Iterator
@@ -324,7 +325,12 @@ def test_files_are_served_with_care(server: Serving) -> None:
         with urllib.request.urlopen(server.url + name, timeout=5) as answer:
             assert answer.headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self';")
             tag = answer.headers["ETag"]
-            assert len(answer.read()) > 300
+            plain = answer.read()
+            assert len(plain) > 300
+        packed = urllib.request.Request(server.url + name, headers={"Accept-Encoding": "br, gzip"})
+        with urllib.request.urlopen(packed, timeout=5) as answer:
+            assert (answer.headers["Content-Encoding"], answer.headers["Vary"]) == ("gzip", "Accept-Encoding")
+            assert gzip.decompress(answer.read()) == plain
         known = urllib.request.Request(server.url + name, headers={"If-None-Match": tag})
         with pytest.raises(urllib.error.HTTPError) as unchanged:
             urllib.request.urlopen(known, timeout=5)
