@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Final, TypeAlias
+from itertools import chain
+from typing import Annotated, Any, ClassVar, Final, TypeAlias
 
 import msgspec
 from msgspec import Meta
@@ -32,7 +34,7 @@ from interfaces.messages.jobs import NONE_LEFT, Doing, Errand, TaskReport
 from interfaces.messages.segments import Dof, Planned, Segmented
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.supervisor import CellChange
-from vrs.checks import normal
+from vrs.checks import SMALLEST, normal
 from vrs.commands import Command
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -200,8 +202,10 @@ def arc_rows(arcs: Iterable[ArcSegment], began: float = 0.0) -> tuple[ArcRow, ..
         arcs: Of the operator's path.
         began: When the drive began that they count from [s].
     """
-    rows = ((arc.start - began, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs)
-    return tuple(tuple(map(normal, row)) for row in rows)  # type: ignore[misc]
+    rows: list[Any] = [(arc.start - began, *arc.posture, arc.v, arc.w, arc.duration) for arc in arcs]
+    if min(map(abs, filter(None, chain.from_iterable(rows))), default=math.inf) < SMALLEST:
+        rows = [tuple(map(normal, row)) for row in rows]
+    return tuple(rows)
 
 
 def _arcs(rows: tuple[ArcRow, ...]) -> tuple[ArcSegment, ...]:
@@ -219,12 +223,6 @@ class ArcPacket:
     """No later packet changes the path before this time [s]."""
     tail: tuple[ArcSegment, ...] = ()
     """How the virtual robot brakes from there, unless the operator goes on."""
-
-    @property
-    def size(self) -> int:
-        """What it takes on the wire [byte]."""
-        arcs = len(self.tail) + sum(len(arcs) for _, arcs in self.runs)
-        return 8 + ARC_RUN_BYTES * len(self.runs) + ARC_BYTES * arcs
 
 
 class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-orders"):
@@ -254,6 +252,12 @@ class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     """How the virtual robot brakes from there, unless the operator goes on."""
     errands: Annotated[tuple[Errand, ...], Meta(max_length=16)] = ()
     """Tasks that it isn't known to have, in their order."""
+
+    @property
+    def size(self) -> int:
+        """What its arcs take on a wire that is made for them [byte]."""
+        arcs = len(self.tail) + sum(len(arcs) for _, arcs in self.runs)
+        return 8 + ARC_RUN_BYTES * len(self.runs) + ARC_BYTES * arcs
 
     @property
     def packet(self) -> ArcPacket:

@@ -92,7 +92,7 @@ class LiveDrives:
         around = robot.architecture.surroundings
         if around is not None and now >= self._due:
             self._due = now + LEARNED
-            capture.learn(now, around.environment.obstacles(robot.next_t))
+            capture.learn(now, around.environment.obstacles(robot.surrounded_at(now)))
 
 
 def _shifted(room: RoomEntry, by: float) -> RoomEntry:

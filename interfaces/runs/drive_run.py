@@ -9,7 +9,7 @@ import numpy as np
 
 from interfaces.link.link import Link
 from interfaces.messages.recording import Direction
-from interfaces.messages.sites import ArchitectureReport, ArcPacket
+from interfaces.messages.sites import DriveOrders, DriveReport
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
 from robots.bullet.rooms import Room
@@ -21,7 +21,7 @@ from vrs.checks import one_of, validated, within
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array
 
-DriveLink: TypeAlias = Link[ArcPacket, ArchitectureReport]
+DriveLink: TypeAlias = Link[DriveOrders, DriveReport]
 """What is between both sites."""
 
 

@@ -29,7 +29,7 @@ from vrs.engine import MobileEngine
 from vrs.mobile import MobileModel
 from vrs.mobile.model import braking
 from vrs.model import Array, frozen_array
-from vrs.segment import ArcSegment
+from vrs.segment import known_arc
 
 COMMANDS: Final = "a mobile robot is driven and stopped: drive and stop are what can be ordered"
 AT_ONCE: Final = "a live drive begins as it comes: leave out execute_at"
@@ -57,16 +57,23 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         *,
         now: float,
         around: Callable[[Posture], OperatorSurroundings | None] = lambda _: None,
+        transport: Transport = Transport.DATAGRAMS,
+        matched: bool = True,
     ) -> None:
-        """Stand, until the real robot has been met.
+        """Stand; where the site says so, until the real robot has been met.
 
         Args:
             model: The robot.
             posture: Where it's shown until then.
             now: [s].
             around: Makes what it avoids, for a drive that begins at a posture.
+            transport: How its path goes to the real robot.
+            matched: Whether the real robot is matched to the path at each report, see `deviation`.
         """
-        self._model, self._around = model, around
+        self._matched = matched
+        self._model, self._around, self._transport = model, around, transport
+        self.ended = False
+        """Whether nothing is commanded any more: the real robot is only sent what it lacks of the path."""
         self.steps = 0
         """Commands since the drive began."""
         self.epochs = 0
@@ -95,7 +102,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         self.began, self.start = now, posture
         self.steps = self._over = 0
         self.architecture = ArchitectureOperatorSite(
-            self._model, posture, Transport.DATAGRAMS, start=now, surroundings=self._around(posture)
+            self._model, posture, self._transport, start=now, surroundings=self._around(posture)
         )
         self.architecture.listener = self._told
         self.engine = self.architecture.engine
@@ -310,20 +317,27 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     @property
     def next_t(self) -> float:
-        """Time of the next command [s]: what surrounds the virtual robot goes by it."""
+        """Time of the next command [s]."""
         return self.began + self.steps * self._model.period
+
+    def surrounded_at(self, now: float) -> float:
+        """Time that its surroundings go by [s], never back: now, from the newest command to the next."""
+        T = self._model.period
+        return min(max(now, self.began + max(self.steps - 1, 0) * T), self.began + self.steps * T)
 
     def _step(self) -> ArcPacket:
         """One command; of a drive that's over the virtual robot only comes to rest."""
         t = self.next_t
         wished = self._wish if t < self._until else self._braked()
         self.steps += 1
+        if self.ended:
+            return self.architecture.repeat()
         if self.site.halted and self.stands:
             return ArcPacket((), self.began)
+        here = self.architecture.posture
         packet = self.architecture.drive(wished.v, wished.w, now=t)
-        v, w = self.architecture.before
-        x, y, theta = self.engine.posture(t).tolist()
-        self.path.add(ArcSegment(t, self._model.period, (x, y, theta), v, w))
+        if self._matched:
+            self.path.add(known_arc(t, self._model.period, here, *self.architecture.before))
         return ArcPacket((), self.began) if self.site.halted else packet
 
     def _braked(self) -> Drive:
@@ -338,15 +352,17 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
     @override
     def hear(self, report: DriveReport, *, new: bool, now: float) -> bool:
         site, known = self.site, self.site.report
+        if report.report is not None and report.epoch == site.epoch and site.cause is not HaltCause.BY_ITSELF:
+            self.architecture.receive(report.report, now=self.surrounded_at(now))
         if not new:
             return False
-        if known is None:
+        if site.cause is HaltCause.NOT_MET:
             self._put(report.posture, now, "the real robot has been met")
             site.halted = Halt(HaltCause.FREE)
         if known is None or report.measured_at > known.measured_at:
             play = report.measured_at if report.play is None else self.began + report.play
-            sample = Sample(0, report.measured_at, play, frozen_array(report.posture))
-            site.inform(lambda listener: listener.measured((sample,), now=now))
+            t, posture = report.measured_at, report.posture
+            site.inform(lambda told: told.measured((Sample(0, t, play, frozen_array(posture)),), now=now))
         return True
 
     @override
@@ -368,8 +384,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
             if not self._errands.waiting and report.doing is Doing.NOTHING:
                 # The next drive begins where it has come to.
                 site.halted = Halt(HaltCause.STOPPED)
-        elif report.report is not None:
-            self.architecture.receive(report.report, now=self.next_t)
+        elif report.report is not None and self._matched:
             self.deviation = self.path.match(report.posture, report.measured_at)
 
     def virtual(self, now: float) -> Posture:

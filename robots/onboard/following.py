@@ -176,6 +176,10 @@ class SensorWatch:
         Returns:
             Whether all of it is sound; else nobody is to use it.
         """
+        few = values if isinstance(values, tuple) else (values,)
+        if all(type(value) is float and low <= value <= high for value in few):
+            # Arrays take five times as long for a few numbers.
+            return self.note(sensor, "", now=now)
         try:
             read = np.asarray(values, np.float64).ravel()
         except (TypeError, ValueError):

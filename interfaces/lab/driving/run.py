@@ -16,10 +16,8 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
-from interfaces.messages.sites import ArcPacket
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Row, Witness, row_of
 from interfaces.teleop.architectures import (
-    ArchitectureOperatorSite,
     ArchitectureRobotSite,
     TimelineController,
     Transport,
@@ -32,16 +30,22 @@ from interfaces.teleop.architectures.compositions import (
     operator_surroundings,
     robot_surroundings,
 )
+from interfaces.teleop.following_base import DrivenConfig, FollowingBase
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import VirtualBase
 from robots.bullet.rooms import Room
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
+from vrs.errors import InvalidValueError
 
 AFTER = 5.0
 """A run goes on for the largest delay and this after the operator stopped [s]."""
 STOPPING = 1.5
 """So long before the end the operator stops [s]."""
+BEAT = 1e-3
+"""Whenever the real robot may report, it does [s]."""
 _LEARNED = round(0.5 / CONTROL)
 """The virtual environment is recorded each so many control periods."""
 LONGEST_WAIT = 600.0
@@ -73,7 +77,7 @@ def run(case: DriveCase, driver: Operator | None = None, witness: Witness | None
         witness: Who notes what happens.
 
     Raises:
-        InvalidValueError: If a name or a value isn't allowed.
+        InvalidValueError: If a name or a value isn't allowed, or the real robot has to stop by itself.
         FormatError: If a trace or inputs can't be read.
     """
     constants = case.constants
@@ -90,19 +94,24 @@ def _driven(
     case: DriveCase, driver: Operator, link: DriveLink, body: MobileRobot, witness: Witness | None
 ) -> DriveRun:
     """Drive from the start until the real robot could have done all."""
-    model = replace(case.real[0].base, period=case.constants.period)
-    made = controller(case.architecture, driver.start, case.constants)
+    constants = case.constants
+    model = replace(case.real[0].base, period=constants.period)
+    made = controller(case.architecture, driver.start, constants)
     senses = architecture(case.architecture).senses
     there = operator_surroundings(body.room, driver.start, model) if senses else None
     here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
-    site = ArchitectureOperatorSite(model, driver.start, case.transport, surroundings=there)
+    virtual = VirtualBase(
+        model, driver.start, now=0.0, around=lambda _: there, transport=case.transport, matched=False
+    )
+    operator, site = OperatorSite(virtual), virtual.architecture
     position = POSITIONS[case.position](body)
-    robot = ArchitectureRobotSite(made, position, body.limits, period=CONTROL, surroundings=here)
+    followed = ArchitectureRobotSite(made, position, body.limits, period=CONTROL, surroundings=here)
+    robot = FollowingBase(lambda *_: followed, position, body.limits, now=0.0, config=DrivenConfig(CONTROL, BEAT))
     if witness is not None:
         witness.begun(case, driver.start, body, site, link)
     steps = round(CONTROL / body.reality.dt)
-    every = round(case.constants.period / CONTROL)
-    driving = every * round(case.length / case.constants.period)
+    every = round(constants.period / CONTROL)
+    driving = every * round(case.length / constants.period)
     end, last = driving, driving + round(LONGEST_WAIT / CONTROL)
     # Packets on their way that were sent while the operator drove.
     waiting = 0
@@ -114,12 +123,22 @@ def _driven(
     k = 0
     while k <= end:
         now, send = k * CONTROL, k % every == 0
-        packet = _packet(case, driver, site, now, driving=k < driving) if send else None
-        if packet is not None:
-            sent_bytes += packet.size
+        virtual.ended = k >= driving
+        if send and not virtual.ended:
+            wanted = driver.drive(now, site.posture, site.before)
+            wanted = STAND if now >= case.length - STOPPING else wanted
+            virtual.wish(wanted.v, wanted.w, issued_at=now, now=now)
+        for orders in operator.advance(now=now):
+            if k == 0:
+                # Here the sites have met before: the robot waits for no packet to begin.
+                robot.begin(orders, now)
+            if virtual.ended and case.transport is not Transport.DATAGRAMS:
+                continue
+            size = orders.size
+            sent_bytes += size
             if witness is not None:
-                witness.sent("forward", now, packet.size)
-            arrival = link.forward.send(packet, now, packet.size)
+                witness.sent("forward", now, size)
+            arrival = link.forward.send(orders, now, size)
             # A stream's packet arrives in the end; a datagram that gets no time of arrival is lost.
             waiting += k < driving and (arrival is not None or case.transport is not Transport.DATAGRAMS)
         for arrived in link.forward.receive(now):
@@ -129,19 +148,22 @@ def _driven(
                 largest = max(largest, arrived.arrived - arrived.sent)
             robot.receive(arrived.payload, now=now)
         for answer in link.backward.receive(now):
-            site.receive(answer.payload, now=now)
+            operator.receive(answer.payload, now=now)
         if there is not None and k % _LEARNED == 0:
-            learned.append((now, there.environment.obstacles(now)))
+            learned.append((now, there.environment.obstacles(virtual.surrounded_at(now))))
         drive = robot.drive(now=now)
-        if send:
-            report = robot.report(now=now)
-            reported_bytes += report.size
+        if robot.halted:
+            raise InvalidValueError("architecture", case.architecture, f"one that drives on: {robot.halted}")
+        for report in robot.advance(now=now) if send else ():
+            assert report.report is not None
+            size = report.report.size
+            reported_bytes += size
             if witness is not None:
-                witness.sent("backward", now, report.size)
-            link.backward.send(report, now, report.size)
+                witness.sent("backward", now, size)
+            link.backward.send(report, now, size)
             estimate = site.estimator.posture.tolist()
         D = made.D if isinstance(made, TimelineController) else None
-        rows.append((now, *body.truth, *robot.posture, *drive, math.nan if D is None else D, *estimate))
+        rows.append((now, *body.truth, *followed.posture, *drive, math.nan if D is None else D, *estimate))
         body.drive(drive.v, drive.w, steps)
         k += 1
         if k > driving:
@@ -162,18 +184,6 @@ def _driven(
         reported_bytes=reported_bytes,
         learned=tuple(learned),
     )
-
-
-def _packet(
-    case: DriveCase, driver: Operator, site: ArchitectureOperatorSite, now: float, *, driving: bool
-) -> ArcPacket | None:
-    """What the operator's site sends in this period, if anything."""
-    if driving:
-        wanted = driver.drive(now, site.posture, site.before)
-        if now >= case.length - STOPPING:
-            wanted = STAND
-        return site.drive(wanted.v, wanted.w, now=now)
-    return site.repeat() if case.transport is Transport.DATAGRAMS else None
 
 
 FOLDER: Final = "runs"

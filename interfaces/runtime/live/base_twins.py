@@ -189,7 +189,7 @@ class BaseTwins(LiveTwins[VirtualBase]):
             real=None if self._real is None else np.array(self._real),
             path=committed,
             driven={twin: np.array(way.places).reshape(-1, 2) for twin, way in self._ways.items()},
-            learned=() if around is None else around.environment.obstacles(virtual.next_t),
+            learned=() if around is None else around.environment.obstacles(virtual.surrounded_at(now)),
             t=t,
             now=now,
         )

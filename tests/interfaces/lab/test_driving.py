@@ -114,6 +114,23 @@ def test_a_run_goes_on_for_the_largest_delay_and_five_seconds() -> None:
     assert drive.t[-1] == pytest.approx(18.0, abs=0.1)
 
 
+def test_a_robot_that_stops_by_itself_ends_the_run_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own_endless.py").write_text(
+        "from robots.onboard.driving import Drive\n"
+        "class Endless:\n"
+        "    executed = 0\n"
+        "    def __init__(self, constants, posture): pass\n"
+        "    def receive(self, arcs, packet, *, now): pass\n"
+        "    def control(self, posture, *, now, v_before): return Drive(float('nan'), 0.0)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    case = DriveCase("own_endless:Endless", "datagrams", "none", "bare", "mixed", 1, 8.0)
+    with pytest.raises(InvalidValueError, match=r"architecture must be one that drives on: .* no finite drive"):
+        run(case)
+
+
 def test_lost_packets_are_repeated_and_the_path_is_kept(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
     rng = np.random.default_rng(0)

@@ -6,12 +6,20 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 
+from interfaces.messages.fields import Epoch
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import DriveReport, Sample
+from interfaces.messages.sites import ArchitectureReport, DriveReport, Sample
 from interfaces.teleop import Correction, SiteObserver
+from interfaces.teleop.architectures.compositions import operator_surroundings
+from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.virtual_base import VirtualBase
+from robots.bullet.rooms import EMPTY
+from robots.onboard.driving import STAND, Posture
+from robots.onboard.supervisor import CellChange
 from tests.interfaces.teleop.rig import MODEL, Rig
 from vrs import Engine, ManualClock
 from vrs.ledger import Receipt
@@ -115,3 +123,48 @@ def test_it_is_drawn_where_the_posture_estimator_has_it_in_an_architecture_that_
     assert drawn < 0.03
     assert drawn <= rig.apart() + 0.02
     assert robot.shown(now=rig.now) == pytest.approx(robot.architecture.estimator.posture)
+
+
+def test_what_a_report_tells_of_the_surroundings_counts_though_a_later_one_has_overtaken_it() -> None:
+    start = Posture(0.0, 0.0, 0.0)
+    around = operator_surroundings(EMPTY, start, MODEL)
+    operator = OperatorSite(VirtualBase(MODEL, start, now=0.0, around=lambda _: around))
+    for t in (0.0, 0.1, 0.2):
+        operator.robot.wish(0.2, 0.0, issued_at=t, now=t)
+        operator.advance(now=t)
+    block = tuple((m, n) for m in (70, 71, 72) for n in (30, 31, 32))
+    seen = ArchitectureReport(1, 0, start, 0, 0.05, tuple(CellChange(cell, 0.05, True) for cell in block))
+    later = DriveReport(
+        Epoch(1), 2, 0.1, 0.1, start, STAND, report=msgspec.structs.replace(seen, number=2, cells=())
+    )
+    operator.receive(later, now=0.2)
+    assert around.environment.obstacles(0.2) == ()
+    operator.receive(DriveReport(Epoch(1), 1, 0.05, 0.05, start, STAND, report=seen), now=0.2)
+    assert around.environment.obstacles(0.2) == block
+    assert operator.report is later
+
+
+def test_who_commands_no_more_only_sends_what_the_real_robot_lacks() -> None:
+    operator = OperatorSite(VirtualBase(MODEL, Posture(0.0, 0.0, 0.0), now=0.0))
+    robot = operator.robot
+    for t in (0.0, 0.1, 0.2):
+        robot.wish(0.2, 0.0, issued_at=t, now=t)
+        operator.advance(now=t)
+    robot.ended = True
+    (orders,) = operator.advance(now=0.3)
+    assert [(first, len(arcs)) for first, arcs in orders.packet.runs] == [(0, 3)]
+    assert (orders.tail, orders.complete_until) == ((), robot.engine.timeline.end)
+    operator.receive(
+        DriveReport(
+            Epoch(1),
+            1,
+            0.3,
+            0.3,
+            Posture(0.0, 0.0, 0.0),
+            STAND,
+            report=ArchitectureReport(1, 2, Posture(0.0, 0.0, 0.0), 2),
+        ),
+        now=0.3,
+    )
+    (orders,) = operator.advance(now=0.4)
+    assert [(first, len(arcs)) for first, arcs in orders.packet.runs] == [(2, 1)]

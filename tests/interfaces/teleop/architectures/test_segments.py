@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.messages.fields import Epoch
+from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket, DriveOrders, arc_rows
 from interfaces.teleop.architectures import ArchitectureOperatorSite, ArchitectureRobotSite, Transport
 from robots import ipr
 from robots.onboard.driving import IPR_LIMITS, STAND, Posture
@@ -117,6 +118,9 @@ def test_what_is_acknowledged_isn_t_sent_again_and_old_acknowledgements_change_n
     assert [first for first, _ in both.drive().runs] == [10]
 
 
-def test_a_packet_says_what_it_takes_on_the_wire() -> None:
-    assert ArcPacket((), 0.0).size == 8
-    assert ArcPacket(((0, (arc(0), arc(1))),), 0.2, (arc(2),)).size == 8 + 44 + 3 * 24
+def test_orders_say_what_their_arcs_take_on_the_wire() -> None:
+    orders = DriveOrders(Epoch(1), 1, 0.0, 0.0, 0.0)
+    assert orders.size == 8
+    rows = arc_rows((arc(0), arc(1), arc(2)))
+    orders = DriveOrders(Epoch(1), 1, 0.0, 0.0, 0.2, runs=((0, rows[:2]),), tail=rows[2:])
+    assert orders.size == 8 + 44 + 3 * 24
