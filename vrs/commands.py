@@ -359,11 +359,15 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
 class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="alter"):
     """Add an offset to the path of the tool that's planned; given again and again, it's followed.
 
-    It's reached 56 ms after it was issued. Where no other one comes, it goes back to nothing.
+    It's reached 56 ms after it was issued; or, from one on that comes later than 28 ms after that, so much later.
+    Where no other one comes, it goes back to nothing.
     """
 
-    offset: Twist
-    """Translation [m], then rotation vector [rad], (6,): all of it, not what's added to the one before."""
+    offset: Twist | None = None
+    """Translation [m], then rotation vector [rad], (6,): all of it, not what's added to the one before.
+
+    None ends it: the path with the offset is what's planned from now on.
+    """
     frame: Frame = Frame.BASE
     """Axes of the offset; those of the tool are those of `tool`, as it's planned to be turned."""
     tool: Pose | None = None
@@ -376,10 +380,12 @@ class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
     """When the path begins to change [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
-        offset = sized_array("offset", self.offset, (6,), "a translation [m] and a rotation vector [rad], (6,)")
-        if np.sqrt(offset[3:] @ offset[3:]) > np.pi:
-            raise InvalidValueError("offset", self.offset, "a rotation vector no longer than π")
-        set_field(self, "offset", offset)
+        if self.offset is not None:
+            allowed = "a translation [m] and a rotation vector [rad] no longer than π, (6,)"
+            offset = sized_array("offset", self.offset, (6,), allowed)
+            if np.sqrt(offset[3:] @ offset[3:]) > np.pi:
+                raise InvalidValueError("offset", self.offset, allowed)
+            set_field(self, "offset", offset)
         if self.tool is not None:
             set_field(self, "tool", _transform("tool", self.tool))
         set_field(self, "frame", word("frame", self.frame, Frame))

@@ -306,6 +306,8 @@ class Alteration(NamedTuple):
     course: altering.Course
     given: Sequence[altering.Given]
     """The newest offsets."""
+    lag: float
+    """How much later than they were issued they count, as they come so late [s]."""
     frame: Frame
     tool: Array | None
     stays: bool
@@ -497,17 +499,26 @@ class Scheduler(BaseScheduler[Timeline]):
         if t - given >= FRESH:
             raise PlanningError(f"the offset is {t - given:.3g} s old; it moves nothing from {FRESH} s on")
         before, known = self.timeline, self._offset_at(t)
+        if command.offset is None:
+            if known is None:
+                raise PlanningError("there's no offset that could become a part of the plan")
+            self.timeline, self.alteration = before.with_version(before.version + 1), None
+            stands = replace(self.ledger.receipt(known.command_id), version=before.version + 1)
+            self.ledger.rewrite(stands)
+            return stands
         if known is not None and not (known.frame is command.frame and _same_tool(known.tool, command.tool)):
             known = None
         if known is None:
             number = self.ledger.newest + 1
             known = Alteration(
-                number, before.version, t, before, t, altering.STILL, (), command.frame, command.tool, command.stays
-            )
-        elif given < known.given[-1][0] + altering.APART:
+                number, before.version, t, before, t, altering.STILL, (), 0.0, command.frame, command.tool,
+                command.stays,
+            )  # fmt: skip
+        elif given + known.lag < known.given[-1][0] + altering.APART:
             return self.ledger.receipt(known.command_id)
-        again = altering.remembered(known.given, command.offset, given)
-        known = known._replace(given=again, stays=command.stays)
+        lag = known.lag if t - given - known.lag <= altering.PROMPT else t - given
+        again = altering.remembered(known.given, command.offset, given + lag)
+        known = known._replace(given=again, stays=command.stays, lag=lag)
         after, known, notes = self._with_offset(before, known, t, before.version + 1)
         late = text_of(notes)
         receipt = Receipt(

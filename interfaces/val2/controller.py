@@ -323,6 +323,7 @@ class Controller(Context):
         """
         self.now = now = max(now, self.now)
         self.signals.advance(now=now)
+        self.arm.renew(now=now)
         self._due |= self.notice()
         task = self._active()
         if task is None:
@@ -349,4 +350,4 @@ class Controller(Context):
             wanted = self.now if self._due else math.inf
         else:
             wanted = max(self._busy, task.next_deadline() if task.waiting and not self._due else self._busy)
-        return min(wanted, self.signals.next_deadline())
+        return min(wanted, self.signals.next_deadline(), self.arm.renewal())

@@ -584,7 +584,13 @@ def _prompt(i: Instruction) -> Instruction:
     return replace(i, operands=(text or Text("", i.at), *names))
 
 
+def _correction(i: Instruction) -> Instruction:
+    """`ALTER () 0, 0, 5` of V+ is a correction: there it's ALTON that has a mode."""
+    return replace(i, keyword="ALTOUT", operands=i.operands[1:]) if i.operands and i.operands[0] is None else i
+
+
 _MEANT: Final[dict[str, Callable[[Instruction], Instruction]]] = {
     "SHIFT": _shift, "WAIT": _wait, "EXIT": _loops, "NEXT": _loops, "PROMPT": _prompt,
+    "ALTER": _correction,
 }  # fmt: skip
 """What is written shortly, and what it stands for."""

@@ -30,6 +30,7 @@ from interfaces.val2.context import (
     StepFunction,
     Typed,
     Waiting,
+    Warned,
 )
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions, kind_of
@@ -216,16 +217,18 @@ def _switch(c: Context, i: Instruction) -> None:
         c.switch(name, i.keyword == "ENABLE")
 
 
-def _alter(c: Context, i: Instruction, _channel: float, mode: float, *correction: float) -> None:
+def _alter(c: Context, i: Instruction, channel: float, mode: float, *correction: float) -> None:
     """ALTER; what is given behind the mode is the first correction."""
-    c.arm.set_alter(whole(mode), now=c.now)
+    c.arm.set_alter(whole(mode), whole(channel), now=c.now)
     if any(operand is not None for operand in i.operands[2:]):
         _correct(c, i, *correction)
 
 
 def _correct(c: Context, _: Instruction, *values: float) -> None:
     c.powered()
-    c.arm.alter(values, now=c.now)
+    late = c.arm.alter(values, now=c.now)
+    if late:
+        c.warn(Warned(f"ALTOUT: {late}"))
 
 
 def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> None:

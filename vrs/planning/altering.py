@@ -24,6 +24,8 @@ from vrs.segment import State
 
 DELAY = 0.056
 """An offset is there so long after it was given [s]."""
+PROMPT = 0.028
+"""Offsets of which one comes later than this after it was given [s] count from then on so much later."""
 FADE = 0.4
 """How long an offset that isn't renewed takes to go back to nothing, at least [s]."""
 _LONGER = (1.0, 2.0, 4.0)

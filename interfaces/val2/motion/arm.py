@@ -34,10 +34,11 @@ from interfaces.val2.motion.places import (
 from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
-from vrs.commands import Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
+from vrs.commands import Alter, Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
 from vrs.ledger import Receipt
 from vrs.model import Array
+from vrs.planning.altering import DELAY
 
 _POLL: Final = 0.01
 """How often it's looked whether an answer has come [s]."""
@@ -52,6 +53,11 @@ _ELSEWHERE: Final = 1e-5
 """Joints of an end that differ by more from the destination [rad]."""
 _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
+_RENEWAL: Final = 0.05
+"""After how long corrections that add up are asked for again [s], before they'd begin to go back."""
+_ALTERED_SPEED: Final = 0.8
+"""Share of the nominal speeds that a motion takes at most while ALTER is on."""
+_ALTERED_ACCELERATION: Final = 0.5
 _LISTED: Final = 256
 """Newest commands that are looked through for what isn't over."""
 
@@ -104,7 +110,11 @@ class Arm(SettingsInForce):
         self._awaited: int | None = None
         """The motion at whose destination the arm is to arrive; None where it's stopped, or has arrived."""
         self._correction: int | None = None
-        """The newest correction by ALTOUT."""
+        """The newest correction by ALTOUT of an arm that stands."""
+        self._altered_at = -math.inf
+        """For when the newest correction on the way was meant [s]."""
+        self._planned: Array | None = None
+        """Where the newest motion goes without corrections on the way [rad], (6,); None where there are none."""
         self._last_settings = MotionSettings()
         """How the newest motion was asked for."""
         self._now = -math.inf
@@ -137,8 +147,13 @@ class Arm(SettingsInForce):
         self._frames_since.append((self._now, frames))
 
     def _goal(self) -> Array:
-        """Joints at the destination [rad], (6,)."""
-        return self.robot.timeline.final() if self._dry is None else self._dry
+        """Joints at the destination [rad], (6,), without what corrections on the way add."""
+        if self._dry is not None:
+            return self._dry
+        if self._planned is None:
+            return self.robot.timeline.final()
+        receipt = self._newest()
+        return self._planned if receipt is None or receipt.q is None else receipt.q
 
     def reaches(self, location: Location, *, now: float) -> bool:
         """Whether a motion could go there: INRANGE."""
@@ -170,7 +185,7 @@ class Arm(SettingsInForce):
         if self._delay is None:
             return -math.inf, -math.inf
         earliest, seconds = self._delay
-        begin = max(earliest, self.robot.timeline.end)
+        begin = max(earliest, self._motion_end())
         return begin, begin + seconds
 
     def answered(self, *, now: float) -> bool:
@@ -206,11 +221,13 @@ class Arm(SettingsInForce):
         if why and now < ends:
             self._give_up(now, ends)
             raise ValError("Motion interrupted", f"the real arm has stopped: {why}")
-        if now >= self._end():
+        altered = self._alterations.on_way is not None
+        if now >= self._end() or (altered and not receipt.stands):
             if self.robot.lost:
                 self._give_up(now, math.inf)
                 raise ValError("Motion interrupted", "there's no connection: where the arm is isn't known")
-            if np.abs(self.robot.timeline.final() - receipt.q).max() > _ELSEWHERE:
+            away = np.abs(self.robot.timeline.final() - receipt.q).max() > _ELSEWHERE
+            if not receipt.stands if altered else away:
                 self._give_up(now, math.inf)
                 raise ValError("Motion interrupted", "the arm was stopped before its destination")
             self._awaited = None
@@ -233,7 +250,7 @@ class Arm(SettingsInForce):
             self.next = self._last_settings
             self._hand.forget()
         self._recent.clear()
-        self._delay = self._at = self._awaited = None
+        self._delay = self._at = self._awaited = self._planned = self._alterations.on_way = None
 
     def ready(self, *, now: float) -> bool:
         """Whether the next motion may be asked for: the last has begun, and all has been answered."""
@@ -250,7 +267,13 @@ class Arm(SettingsInForce):
         return now >= max(self._end(), self._hand.end) and self._nulled(now)
 
     def _end(self) -> float:
-        return max(self.robot.timeline.end, self._delay_span()[1])
+        return max(self._motion_end(), self._delay_span()[1])
+
+    def _motion_end(self) -> float:
+        """When the newest motion ends [s]; with what corrections on the way last where none more are to come."""
+        if self._alterations.on_way is None or self._alterations.ends:
+            return self.robot.timeline.end
+        return self.robot.timeline.end if self._newest() is None else self._arrival()
 
     def _nulled(self, now: float) -> bool:
         """Whether the other twin is there, where a motion was to end so."""
@@ -263,7 +286,7 @@ class Arm(SettingsInForce):
     def next_deadline(self) -> float:
         """When any of these may change by itself [s]; infinity for never."""
         now, (delayed, ends) = self._now, self._delay_span()
-        times = [self.robot.timeline.end, self._hand.end, self._pace.next_deadline(), delayed, ends]
+        times = [self._motion_end(), self._hand.end, self._pace.next_deadline(), delayed, ends, self.renewal()]
         if self._awaited is not None:
             times.append(now + self.robot.fault_poll_interval)
         if self._recent:
@@ -274,6 +297,60 @@ class Arm(SettingsInForce):
         if self._last_settings.nulling and now >= self._end() and not self._nulled(now):
             times.append(now + _NULL_POLL)
         return min((t for t in times if t > now), default=math.inf)
+
+    def renewal(self) -> float:
+        """When `renew` has something to do [s]; infinity for never."""
+        alterations = self._alterations
+        if alterations.on_way is None:
+            return self._arrival() if alterations.ends else math.inf
+        if self._goes_on():
+            return self._altered_at + _RENEWAL
+        return math.inf if alterations.cumulative and not alterations.ends else self.robot.timeline.end
+
+    def renew(self, *, now: float) -> None:
+        """Let corrections that add up stay on the path while it goes on; forget those that are gone."""
+        now = self._now = max(now, self._now)
+        if now < self.renewal():
+            return
+        offset = self._alterations.on_way
+        if offset is not None and self._goes_on():
+            self._add(offset, now, now)
+        else:
+            self._keep(now)
+
+    def _goes_on(self) -> bool:
+        """Whether the arm is on a motion on which corrections that add up wouldn't stay by themselves."""
+        return self._alterations.cumulative and self._altered_at + DELAY < self._arrival()
+
+    def _arrival(self) -> float:
+        """When the newest motion ends, whatever corrections on the way last [s]; in the past where there's none."""
+        receipt = self._newest()
+        return -math.inf if receipt is None or receipt.end is None or not receipt.stands else receipt.end
+
+    def _newest(self) -> Receipt | None:
+        """Of the newest motion; None while that's unknown."""
+        outcome = self.robot.outcome(self._recent[-1][0], now=self._now) if self._recent else None
+        return None if outcome is None else outcome.receipt
+
+    def _keep(self, now: float) -> None:
+        """The path goes on from where corrections on the way have led."""
+        alterations = self._alterations
+        if alterations.on_way is not None and alterations.cumulative:
+            self.robot.ask(Alter(), now=now)
+            # It has arrived, though elsewhere.
+            self._awaited = None if self._arrival() > -math.inf else self._awaited
+        alterations.on_way = self._planned = None
+        if alterations.ends:
+            alterations.set(None)
+
+    def _add(self, offset: Transformation, given: float, now: float) -> Issued | None:
+        """Add corrections to the path on the way; what came of it, None while nothing was heard."""
+        if self._alterations.on_way is None:
+            self._planned = self.robot.timeline.final()
+        command = replace(self._alterations.command(offset, self._frames), issued_at=given)
+        number = self.robot.ask(command, now=now)
+        self._alterations.on_way, self._altered_at = offset, given
+        return self.robot.outcome(number, now=now)
 
     def _moves(self, now: float) -> bool:
         """Whether the arm is on a motion that a program or the monitor asked for, and no correction by ALTOUT."""
@@ -349,14 +426,21 @@ class Arm(SettingsInForce):
         if self._dry is None:
             self._hand.actuate(hand, now)
 
-    def alter(self, values: tuple[float, ...], *, now: float) -> None:
-        """ALTOUT; the arm must not be on another motion.
+    def alter(self, values: tuple[float, ...], *, now: float) -> str:
+        """ALTOUT: on the way a correction of the path; of an arm that stands, a motion.
 
         What was asked for the next motion, its speed and the hand, waits for that.
+
+        Returns:
+            What keeps the arm from following in time; empty where nothing does, or while that isn't known.
         """
         self._update(now)
-        if self._moves(now):
-            raise ValError("Robot is moving", "the path is altered between motions: BREAK comes first")
+        self.renew(now=now)
+        if self._alterations.on_way is not None or self._moves(now):
+            outcome = self.correct(values, given=now, now=now)
+            if outcome is not None and outcome.reason:
+                raise ValError("Path can't be altered so", in_millimetres(outcome.reason))
+            return "" if outcome is None or outcome.receipt is None else outcome.receipt.hindrance
         if not self.answered(now=now):
             raise ValError("Robot is moving", "what was asked before has no answer yet")
         place = self._alterations.corrected(values, self._frames.where(self._goal(), 0.0).tool)
@@ -377,6 +461,35 @@ class Arm(SettingsInForce):
             self._correction = self._go(command, now)
             self._delay = None
         self._alterations.taken(place)
+        return ""
+
+    def correct(self, values: tuple[float, ...], *, given: float, now: float) -> Issued | None:
+        """Correct the path on the way, as ALTOUT does while the arm moves; wherever it is.
+
+        Args:
+            values: X, Y, Z [mm], and the turn of the tip: a rotation vector's x, y, z [deg].
+            given: When the correction was made [s].
+            now: Session time [s].
+
+        Returns:
+            What came of it; None while nothing was heard.
+
+        Raises:
+            ValError: If the path isn't altered, or the values aren't six finite numbers.
+        """
+        self._update(now)
+        if self._alterations.ends and now >= self._arrival():
+            raise ValError("Path isn't altered", "NOALTER has ended it")
+        offset = self._alterations.added(values)
+        if self._dry is not None:
+            return None
+        return self._add(offset, given, now)
+
+    def altering(self, channel: int) -> bool:
+        """Whether the path is altered by corrections that come on a channel."""
+        alterations = self._alterations
+        over = alterations.ends and self._now >= self._arrival()
+        return alterations.mode is not None and not over and alterations.channel == channel
 
     def _move(
         self,
@@ -411,6 +524,13 @@ class Arm(SettingsInForce):
                 acceleration=manner.acceleration,
                 tool=self._frames.tip() if straight else None,
             )
+            if self._alterations.mode is not None:
+                # What is left of the limits is for corrections on the way.
+                command = replace(
+                    command,
+                    speed=min(command.speed, _ALTERED_SPEED),
+                    acceleration=min(command.acceleration, _ALTERED_ACCELERATION),
+                )
             if manner.duration > 0:
                 command = self._stretched(command, near, manner.duration)
             number = self._go(command, now)
@@ -482,6 +602,7 @@ class Arm(SettingsInForce):
         """UNDO, ours: take back the newest command; what became of it, one line."""
         self._update(now)
         self._interrupted, self._delay, self._awaited = (), None, None
+        self._planned = self._alterations.on_way = None
         self._hand.forget()
         self.next = replace(self.next, hand=None, relaxes=False)
         number = self.robot.ask(None, now=now)
@@ -564,15 +685,27 @@ class Arm(SettingsInForce):
             raise ValError("Illegal value", "a time is finite")
         self._at = t
 
-    def set_alter(self, mode: int | None, *, now: float) -> None:
-        """ALTER with a mode's bits (1: cumulative, 2: world axes, those of BASE), NOALTER with None."""
+    def set_alter(self, mode: int | None, channel: int = 0, *, now: float) -> None:
+        """ALTER with a mode's bits (1: cumulative, 2: world axes, those of BASE), NOALTER with None.
+
+        What corrections on the way add up to stays until the arm stands.
+        """
         self._update(now)
-        self._alterations.set(mode)
+        alterations = self._alterations
+        if mode is None and alterations.mode is not None:
+            alterations.ends = True
+            self.renew(now=now)
+            return
+        if alterations.on_way is not None:
+            self._keep(now)
+        alterations.set(mode, channel)
 
     def begin_program(self) -> None:
         """EXECUTE: speeds, tolerances and requests are as at the beginning."""
         self.always = self.next = MotionSettings()
         self._at, self._interrupted = None, ()
+        if self._alterations.on_way is not None:
+            self._keep(self._now)
         self._alterations.set(None)
 
 

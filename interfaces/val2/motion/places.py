@@ -20,9 +20,10 @@ from interfaces.val2.values import (
     to_base,
     to_val_joints,
 )
+from vrs.commands import Alter, Frame
 from vrs.errors import InvalidValueError, OutOfLimitsError, UnreachablePoseError
 from vrs.model import Array, RobotModel
-from vrs.planning.path import rotations
+from vrs.planning.path import rotation_vector, rotations
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,17 +202,23 @@ _SAME: Final = 1e-6
 
 
 class Alterations:
-    """Where corrections since ALTER lead."""
+    """Where corrections since ALTER lead: an arm that stands, to a place; one on its way, off what is planned."""
 
     def __init__(self) -> None:
         self.mode: int | None = None
         """None while the path isn't altered."""
+        self.channel = 0
+        """By which corrections come from elsewhere."""
         self._nominal: Transformation | None = None
         """Where the tool would be without corrections."""
         self._newest: Transformation | None = None
         """Where the newest correction leads."""
+        self.on_way: Transformation | None = None
+        """What is added on the way to what's planned; None while nothing is."""
+        self.ends = False
+        """Whether it's over when the arm stands."""
 
-    def set(self, mode: int | None) -> None:
+    def set(self, mode: int | None, channel: int = 0) -> None:
         """Begin, or end with None.
 
         Raises:
@@ -220,7 +227,13 @@ class Alterations:
         if mode is not None and mode not in MODES:
             detail = f"mode {mode}: {MODES[0]} to {MODES[-1]}; 1 is cumulative, 2 along world axes, 3 both"
             raise ValError("Illegal value", detail)
-        self.mode, self._nominal, self._newest = mode, None, None
+        self.mode, self.channel, self.ends = mode, channel, False
+        self._nominal = self._newest = self.on_way = None
+
+    @property
+    def cumulative(self) -> bool:
+        """Whether each correction adds to those before."""
+        return self.mode is not None and bool(self.mode & CUMULATIVE)
 
     def corrected(self, values: tuple[float, ...], destination: Transformation) -> Transformation:
         """The tool's place after a correction.
@@ -235,24 +248,49 @@ class Alterations:
         Raises:
             ValError: If the path isn't altered, or the values aren't six finite numbers.
         """
+        mode, asked = self._asked(values)
+        before = self._newest
+        if before is None or np.abs(before.X - destination.X).max() > _SAME:
+            before = self._nominal = destination
+        start = before if mode & CUMULATIVE or self._nominal is None else self._nominal
+        return _moved(start, asked, world=bool(mode & WORLD))
+
+    def taken(self, place: Transformation) -> None:
+        """A correction was asked for that leads to a place."""
+        self._newest = place
+
+    def added(self, values: tuple[float, ...]) -> Transformation:
+        """What is to be added to the tool's planned place from a correction on, as `corrected` takes it."""
+        mode, asked = self._asked(values)
+        start = self.on_way if mode & CUMULATIVE and self.on_way is not None else NULL
+        return _moved(start, asked, world=bool(mode & WORLD))
+
+    def _asked(self, values: tuple[float, ...]) -> tuple[int, Array]:
         if self.mode is None:
             raise ValError("Path isn't altered", "ALTER comes first")
         asked = np.array(values, dtype=np.float64)
         if asked.shape != (6,) or not np.isfinite(asked).all():
             raise ValError("Illegal value", "a correction is X, Y, Z [mm] and three turns [deg]")
-        before = self._newest
-        if before is None or np.abs(before.X - destination.X).max() > _SAME:
-            before = self._nominal = destination
-        start = before if self.mode & CUMULATIVE or self._nominal is None else self._nominal
-        X, turn = np.array(start.X), rotations(np.radians(asked[None, 3:]))[0]
-        if self.mode & WORLD:
-            X[:3, :3] = turn @ X[:3, :3]
-            X[:3, 3] += asked[:3]
-        else:
-            X[:3, 3] += X[:3, :3] @ asked[:3]
-            X[:3, :3] = X[:3, :3] @ turn
-        return Transformation(X)
+        return self.mode, asked
 
-    def taken(self, place: Transformation) -> None:
-        """A correction was asked for that leads to a place."""
-        self._newest = place
+    def command(self, offset: Transformation, frames: Frames) -> Alter:
+        """What adds it to the path."""
+        way = np.concatenate([offset.X[:3, 3] / 1000.0, rotation_vector(offset.X[:3, :3])])
+        in_world = self.mode is not None and bool(self.mode & WORLD)
+        if in_world:
+            R = AXES @ frames.base.X[:3, :3].T
+            way = np.concatenate([R @ way[:3], R @ way[3:]])
+        frame = Frame.BASE if in_world else Frame.TOOL
+        return Alter(way, frame, frames.tip(), stays=self.cumulative)
+
+
+def _moved(start: Transformation, asked: Array, *, world: bool) -> Transformation:
+    """A place after a correction, six numbers [mm, deg], along the axes of its frame or its own."""
+    X, turn = np.array(start.X), rotations(np.radians(asked[None, 3:]))[0]
+    if world:
+        X[:3, :3] = turn @ X[:3, :3]
+        X[:3, 3] += asked[:3]
+    else:
+        X[:3, 3] += X[:3, :3] @ asked[:3]
+        X[:3, :3] = X[:3, :3] @ turn
+    return Transformation(X)

@@ -244,11 +244,19 @@ class FakeArm:
         """AT."""
         self._note(self._seen, "at", t)
 
-    def alter(self, values: tuple[float, ...], *, now: float) -> None:
+    def alter(self, values: tuple[float, ...], *, now: float) -> str:
         """ALTOUT."""
         self._note(now, "alter", *values)
+        return ""
 
-    def set_alter(self, mode: int | None, *, now: float) -> None:
+    def renew(self, *, now: float) -> None:
+        """No correction is on the way."""
+
+    def renewal(self) -> float:
+        """Never."""
+        return math.inf
+
+    def set_alter(self, mode: int | None, channel: int = 0, *, now: float) -> None:
         """ALTER, NOALTER."""
         self._note(now, "set_alter", mode)
 

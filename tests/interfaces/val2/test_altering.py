@@ -149,14 +149,8 @@ def test_a_brake_before_a_correction_begins_keeps_its_own_settings():
     assert bench.settle() - begun > 2.0
 
 
-def test_alter_is_between_motions_and_needs_power(tmp_path):
+def test_alter_comes_first_and_needs_power(tmp_path):
     bench = Bench()
-    bench.arm.set_alter(0, now=0.0)
-    bench.arm.move(SQUARE[0], straight=False, now=0.0)
-    with pytest.raises(ValError, match=r"\*Robot is moving\*"):
-        correct(bench, 1)
-    bench.arm.set_alter(None, now=0.0)
-    bench.settle()
     with pytest.raises(ValError, match=r"\*Path isn't altered\*"):
         correct(bench, 1)
     for mode in (4, -1):

@@ -74,6 +74,7 @@ def statement(text):
         ("SIGNAL 1,-2", Instruction("SIGNAL", (number(1), Apply("-", (number(2),))))),
         ("WAIT", Instruction("WAIT")),
         ("ALTER (1) 3", Instruction("ALTER", (number(1), number(3)))),
+        ("ALTER () 1, 3", Instruction("ALTOUT", (number(1), number(3)))),
         ("ALTOUT 0,0,1,0,0,0", Instruction("ALTOUT", tuple(map(number, (0, 0, 1, 0, 0, 0))))),
         ("AT 3.5", Instruction("AT", (number(3.5),))),
         ("GRASP 20, 90", Instruction("GRASP", (number(20), number(90)))),
