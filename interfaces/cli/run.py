@@ -20,7 +20,18 @@ from interfaces.cli.demo import (
     show,
     write,
 )
-from interfaces.cli.options import Delay, DialectName, Offset, Order, Out, RobotName, dialect_of, val_robot
+from interfaces.cli.options import (
+    Delay,
+    DialectName,
+    Offset,
+    Order,
+    Out,
+    ProgramFiles,
+    RobotName,
+    dialect_of,
+    program_files,
+    val_robot,
+)
 from interfaces.system import read_within
 from robots.robot import USUAL
 
@@ -46,6 +57,7 @@ def run(
         int, typer.Option("--seed", min=0, metavar="N", help="Seed of everything random, RANDOM too.")
     ] = DEFAULT_SEED,
     dialect: DialectName = "",
+    files: ProgramFiles = None,
     out: Out = Path("out"),
     limit: Annotated[
         float, typer.Option("--limit", min=1, max=3600, metavar="S", help="When the program is given up [s].")
@@ -66,12 +78,13 @@ def run(
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name)
+    directory = program_files(files)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
         source, robot, profile,
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
-        keeper=recorder,
+        files=directory, keeper=recorder,
     )  # fmt: skip
     whole, attributions, offsets = explained(played.plan, played.run, robot, profile, seed, D, order)
     recorder.finish(attributions, offsets)
