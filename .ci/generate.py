@@ -445,8 +445,7 @@ def _language_table(part: str, parts: list[str]) -> list[str]:
             rows = _section(forms.INSTRUCTIONS, first, firsts)
             return _forms_table(rows, "where", _place)
         case "functions":
-            known = {name: row for name, row in forms.FUNCTIONS.items() if "idle" not in row.tags}
-            return _forms_table(_section(known, first, firsts), "gives", lambda row: GIVEN[row.gives])
+            return _forms_table(_section(forms.FUNCTIONS, first, firsts), "gives", lambda row: GIVEN[row.gives])
         case "switches":
             cells = [(f"`{one.name}`", "on" if one.default else "off", one.help, one.origin)
                      for one in forms.SWITCHES.values()]  # fmt: skip
@@ -465,8 +464,6 @@ def _language_table(part: str, parts: list[str]) -> list[str]:
             )
         case "passed":
             return [_listed(sorted(forms.IGNORED - forms.UNAVAILABLE.keys()))]
-        case "idle":
-            return [_listed(name for name, row in forms.FUNCTIONS.items() if "idle" in row.tags)]
     raise KeyError(kind)
 
 

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, argument, dialect_of, option, val_robot
+from interfaces.cli.options import (
+    DialectName,
+    ProgramFiles,
+    RobotName,
+    argument,
+    dialect_of,
+    option,
+    program_files,
+    val_robot,
+)
 from interfaces.cli.run import text_of
 from robots.robot import USUAL
 
@@ -32,6 +41,7 @@ def check(
     static: Annotated[bool, option("--static", "Only read the programs; don't plan what one would do.")] = False,
     name: RobotName = USUAL,
     dialect: DialectName = "",
+    files: ProgramFiles = None,
     as_json: Annotated[bool, option("--json", "Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
@@ -44,7 +54,9 @@ def check(
     found = [(path, finding) for path, (_, some) in zip(programs, checked, strict=True) for finding in some]
     sources = [source for source, _ in checked if source is not None]
     if not static and not _wrong(found):
-        found += _rehearsed(dict(zip(programs, sources, strict=True)), program, val_robot(name).arm)
+        found += _rehearsed(
+            dict(zip(programs, sources, strict=True)), program, val_robot(name).arm, program_files(files)
+        )
     found = _once(found)
     if as_json:
         listed = [
@@ -61,7 +73,9 @@ def _wrong(found: Sequence[_Found]) -> bool:
     return any(finding.severity == "error" for _, finding in found)
 
 
-def _rehearsed(sources: Mapping[Path, SourceFile], program: str, model: RobotModel) -> list[_Found]:
+def _rehearsed(
+    sources: Mapping[Path, SourceFile], program: str, model: RobotModel, files: Path | None
+) -> list[_Found]:
     """What only planning shows: a program on a virtual arm alone."""
     from interfaces.val2.playing import rehearse
     from interfaces.val2.source import joined
@@ -70,7 +84,7 @@ def _rehearsed(sources: Mapping[Path, SourceFile], program: str, model: RobotMod
     usual = next(iter(sources))
     return [
         (path_of.get(found.error.program, usual), replace(found, error=found.error.at(place=found.place)))
-        for found in rehearse(joined([*sources.values()], program), model).findings
+        for found in rehearse(joined([*sources.values()], program), model, files=files).findings
     ]
 
 

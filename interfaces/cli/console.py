@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, dialect_of, option, val_robot
+from interfaces.cli.options import DialectName, RobotName, dialect_of, option, program_files, val_robot
 from interfaces.system import module_process, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
@@ -43,7 +43,10 @@ def console(
     alone: Annotated[bool, option("--alone", "A virtual arm in this process only: no real one, no page.")] = False,
     name: RobotName = USUAL,
     delay: Annotated[str, option("PROFILE", "Emulated on the way to the robot that this begins.")] = "none",
-    files: Annotated[Path, option("DIR", "Where LOAD and STORE find files.")] = Path(),
+    files: Annotated[
+        Path | None,
+        option("DIR", "Where LOAD, STORE and programs find files; unless given, here, and programs nowhere."),
+    ] = None,
     dialect: DialectName = "",
 ) -> None:
     """Move an arm by VAL-II commands; HELP lists them. From a pipe, lines are done one after the other."""
@@ -58,8 +61,7 @@ def console(
     if name != USUAL and connect is not None:
         raise InvalidValueError("robot", name, "left out with --connect: the server has its own")
     robot = val_robot(name)
-    if not files.is_dir():
-        raise InvalidValueError("files", str(files), "a directory")
+    program_files(files)
     delay_profile(delay)
     spoken = dialect_of(dialect)
     if alone:
@@ -73,7 +75,7 @@ def console(
             _connected(url, None, files, spoken)
 
 
-def _alone(robot: Robot, files: Path, dialect: Dialect | None) -> None:
+def _alone(robot: Robot, files: Path | None, dialect: Dialect | None) -> None:
     from interfaces.val2.monitor.control import Control
     from interfaces.val2.motion import arm_for
     from vrs.clock import ManualClock, WallClock
@@ -85,7 +87,7 @@ def _alone(robot: Robot, files: Path, dialect: Dialect | None) -> None:
     _converse(arm_for(engine), Control(), WallClock(), files, dialect, what)
 
 
-def _connected(url: str, token_file: Path | None, files: Path, dialect: Dialect | None) -> None:
+def _connected(url: str, token_file: Path | None, files: Path | None, dialect: Dialect | None) -> None:
     from interfaces import connect
     from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
@@ -98,7 +100,9 @@ def _connected(url: str, token_file: Path | None, files: Path, dialect: Dialect 
         _converse(arm_for(connection), LeaseControl(connection), connection, files, dialect, what)
 
 
-def _converse(arm: Arm, control: Control, clock: Clock, files: Path, dialect: Dialect | None, what: str) -> None:
+def _converse(
+    arm: Arm, control: Control, clock: Clock, files: Path | None, dialect: Dialect | None, what: str
+) -> None:
     """Let a person, or a pipe, work at the monitor."""
     import asyncio
 
@@ -106,13 +110,14 @@ def _converse(arm: Arm, control: Control, clock: Clock, files: Path, dialect: Di
     from interfaces.val2.monitor.control import SharedController
     from interfaces.val2.monitor.files import Files
     from interfaces.val2.monitor.monitor import TerminalMonitor
+    from interfaces.val2.units import Units
     from interfaces.val2.values import VPLUS
 
-    controller = Controller(arm, parameters=arm.parameters, now=clock.now())
+    controller = Controller(arm, parameters=arm.parameters, units=Units(files), now=clock.now())
     controller.parameters["VPLUS"] = float(dialect is VPLUS)
     typed = sys.stdin.isatty() and sys.stdout.isatty()
     shared = SharedController(controller, control)
-    monitor = TerminalMonitor(shared, Files(files, anywhere=True), what, queues_commands=not typed)
+    monitor = TerminalMonitor(shared, Files(files or Path(), anywhere=True), what, queues_commands=not typed)
     asyncio.run(_typed(monitor, clock) if typed else _piped(monitor, clock))
 
 

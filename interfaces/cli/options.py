@@ -72,6 +72,9 @@ DialectName: TypeAlias = Annotated[
         "Angles of files that don't say: val2's O, A, T (unless given), or vplus's yaw, pitch, roll.",
     ),
 ]
+ProgramFiles: TypeAlias = Annotated[
+    Path | None, option("--files DIR", "Where programs may read and write files; nowhere unless given.")
+]
 VAL_JOINTS = 6
 """Joints that VAL-II's places have."""
 RobotName: TypeAlias = Annotated[
@@ -162,6 +165,17 @@ def dialect_of(name: str) -> Dialect | None:
     if name.upper() not in (*DIALECTS, ""):
         raise InvalidValueError("dialect", name, "val2 or vplus")
     return DIALECTS.get(name.upper())
+
+
+def program_files(directory: Path | None) -> Path | None:
+    """The directory of programs' files.
+
+    Raises:
+        InvalidValueError: If it's none.
+    """
+    if directory is not None and not directory.is_dir():
+        raise InvalidValueError("files", str(directory), "a directory")
+    return directory
 
 
 OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose")

@@ -26,10 +26,12 @@ from interfaces.cli.options import (
     Offset,
     Order,
     Out,
+    ProgramFiles,
     RobotName,
     argument,
     dialect_of,
     option,
+    program_files,
     val_robot,
 )
 from interfaces.system import read_within
@@ -51,6 +53,7 @@ def run(
     service: Order = "datagram",
     seed: Annotated[int, option("N", "Seed of everything random, RANDOM too.", min=0)] = DEFAULT_SEED,
     dialect: DialectName = "",
+    files: ProgramFiles = None,
     out: Out = Path("out"),
     limit: Annotated[float, option("S", "When the program is given up [s].", min=1, max=3600)] = 600.0,
 ) -> None:
@@ -69,12 +72,13 @@ def run(
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name)
+    directory = program_files(files)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
         source, robot, profile,
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
-        keeper=recorder,
+        files=directory, keeper=recorder,
     )  # fmt: skip
     whole, attributions, offsets = explained(played.plan, played.run, robot, profile, seed, D, order)
     recorder.finish(attributions, offsets)

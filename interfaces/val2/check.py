@@ -10,13 +10,14 @@ from typing import Final
 from typing_extensions import override
 
 from interfaces.val2 import forms
-from interfaces.val2.compiler import compiled, compiled_step
-from interfaces.val2.context import MOST_PERCENT, TIMERS, Context
+from interfaces.val2.compiler import compiled_step
+from interfaces.val2.context import MOST_PERCENT, TASKS, TIMERS
+from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import Closure, kind_of
 from interfaces.val2.functions import row_of
-from interfaces.val2.grammar import SIGNIFICANT, name_of
-from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
+from interfaces.val2.grammar import SIGNIFICANT
+from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
@@ -100,7 +101,7 @@ class _Names:
         self.programs: dict[str, Program] = {}
         self._unknown: set[str] = set()
         """Programs whose arguments can't be read."""
-        self.context = Context(Arm(EngineRobot(Engine(puma560.model()))), compiled)
+        self.context = Controller(Arm(EngineRobot(Engine(puma560.model()))))
         """For what compiling shows; nothing runs in it."""
         self._set: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         """Names that are set, by the programs whose own they are, and the kinds of what they're set to; the empty
@@ -135,12 +136,12 @@ class _Names:
         if called is None:
             close = did_you_mean(i.program.upper(), [known.upper() for known in self.programs])
             yield ValError("Undefined program", f"{i.program}{close.lower()}", place=i.at)
-        elif i.keyword in ("CALL", "GOSUB") and i.program not in self._unknown:
-            parameters = called.parameters
-            if len(i.operands) > len(parameters):
-                detail = f"{i.program} takes {len(parameters)}, and here are {len(i.operands)}"
+        elif STATEMENTS[i.keyword].rule in ("call", "tasks") and i.program not in self._unknown:
+            parameters, arguments = called.parameters, arguments_of(i)
+            if len(arguments) > len(parameters):
+                detail = f"{i.program} takes {len(parameters)}, and here are {len(arguments)}"
                 yield ValError("Too many arguments", detail, place=i.at)
-            for argument, parameter in zip(i.operands, parameters, strict=False):
+            for argument, parameter in zip(arguments, parameters, strict=False):
                 if argument is not None:
                     yield from _passed(argument, parameter)
 
@@ -222,12 +223,6 @@ class _Checker(ProgramCompiler):
         self._errors += [] if error is None else [error]
         return made
 
-    @override
-    def idle(self, e: Apply, value: float | str) -> Closure:
-        shown = '""' if value == "" else "0"
-        self._warnings.append(ValError("No meaning here", f"{e.function} is {shown}", place=e.at))
-        return _nothing
-
 
 def _nothing(_: Slots) -> None:
     """Stand for what can't be compiled."""
@@ -291,9 +286,9 @@ _STRANGE: Final = {
 """What second angles a dialect prints, and from where on, on which side, one looks like the other dialect's."""
 
 
-_VPLUS_ALONE: Final = frozenset(
-    ["ATTACH", "AUTO", "DETACH", "EXECUTE", "FCLOSE", "GLOBAL", "LOCAL", "READ", "SELECT", "WRITE"]
-)
+_VPLUS_ALONE: Final = (
+    "ATTACH", "AUTO", "DETACH", "EXECUTE", "FCLOSE", "GLOBAL", "LOCAL", "READ", "SELECT", "WRITE",
+)  # fmt: skip
 """Instructions that no program of VAL-II's has."""
 
 
@@ -334,9 +329,8 @@ _ROUNDED: Final = 1e-3
 
 def _written(i: Instruction) -> Iterator[Variable]:
     """The variables that a statement may set; `$DECODE` shortens its first argument."""
-    if i.keyword in ("ATTACH", "READ"):
-        # Of a file of V+: what is read, and the file's number.
-        yield from (Variable(name_of(word)) for word in _WORD.findall(i.passed or "") if word[0] != '"')
+    if i.keyword == "ATTACH" and i.operands and isinstance(i.operands[0], Variable):
+        yield i.operands[0]
     if i.passed is not None or i.keyword in ("AUTO", "LOCAL", "GLOBAL"):
         return
     row = STATEMENTS[i.keyword]
@@ -378,6 +372,7 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "time": _range(0, 1e9, "seconds, not negative"),
     "speed": _range(1e-3, 1e6, "a speed above 0"),
     "mode": _range(0, 3, "a mode, 0 to 3"),
+    "task": _range(TASKS[0], TASKS[-1], f"a task, {TASKS[0]} to {TASKS[-1]}"),
     "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
 """What numbers that are written down have to be."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Generator, MutableMapping
+from collections.abc import Callable, Generator, Mapping, MutableMapping
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias
+from enum import Enum
+from typing import Any, Final, Protocol, TypeAlias
 
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
 from interfaces.val2.memory import Memory, Slots, VariableSlot
@@ -14,6 +16,7 @@ from interfaces.val2.motion.arm import Arm
 from interfaces.val2.rows import PARAMETERS, SWITCHES
 from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import Program
+from interfaces.val2.units import Units
 from interfaces.val2.values import VAL2, VPLUS, Dialect
 
 
@@ -42,6 +45,7 @@ class ProgramPaused:
     """The next step, from 1."""
     word: str
     """Why: `PAUSE`, `ABORT` or `XSTEP`."""
+    task: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,7 @@ class ProgramEnded:
     """Empty for a `DO`."""
     word: str
     """How: `END`, `STOP`, `HALT`, `ABORT` or `DO`."""
+    task: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,7 @@ class ProgramFailed:
     """A program, or a `DO`, was stopped by an error."""
 
     error: ValError
+    task: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,8 +159,56 @@ Action: TypeAlias = "Invoke | Ending | Waiting | int"
 """What a special step wants done; a number is the next step's index, after reactions have been looked at."""
 
 
+class ProgramState(Enum):
+    """What a program does."""
+
+    IDLE = "idle"
+    """It has ended."""
+    RUNNING = "running"
+    PAUSED = "paused"
+    """It can go on: after PAUSE, ABORT, a single step or an error."""
+
+
+TASKS: Final = range(28)
+"""Programs that may run beside each other. Task 0 is the main one, which has the arm as it begins."""
+PROCESS_CONTROL: Final = 1
+"""The task of VAL-II's process control program."""
+
+
+class RunningTask(Protocol):
+    """A program that runs, or has run, as a task; see `interfaces.val2.interpreter.Task`."""
+
+    number: int
+    robot: bool
+    """Whether it has the arm while it runs."""
+    attaching: bool
+    """Whether it waits for the arm."""
+    state: ProgramState
+    word: str
+    """Why it paused or ended."""
+    cycles: int
+    reactions: Reactions
+
+    @property
+    def program(self) -> str:
+        """What it was begun with."""
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it waits for something else than its turn."""
+
+    def pause(self, word: str) -> None:
+        """Stand; the present step is given up if it has begun."""
+
+    def end(self, word: str) -> None:
+        """End now."""
+
+    def go_on(self, *, again: bool, single: bool = False) -> None:
+        """Run, from the next step or from the one that was given up."""
+
+
 @dataclass(slots=True)
-class Context:
+class Context(ABC):
     """What the closures of compiled programs reach out to."""
 
     arm: Arm
@@ -163,10 +217,17 @@ class Context:
     memory: Memory = field(default_factory=Memory)
     signals: Signals = field(default_factory=Signals)
     reactions: Reactions = field(default_factory=Reactions)
+    """Of the main program, and of a DO."""
+    tasks: Mapping[int, RunningTask] = field(default_factory=dict)
+    """Those that run or stand, or have ended; by number."""
+    task: RunningTask | None = None
+    """The one whose steps are done now."""
     switches: dict[str, bool] = field(default_factory=lambda: {s.name: bool(s.default) for s in SWITCHES.values()})
     parameters: MutableMapping[str, float] = field(
         default_factory=lambda: {p.name: p.default for p in PARAMETERS.values()}
     )
+    units: Units = field(default_factory=Units)
+    """Files of programs."""
     rng: random.Random = field(default_factory=lambda: random.Random(0))  # noqa: S311
     now: float = 0.0
     timers: list[float] = field(default_factory=lambda: [0.0] * len(TIMERS))
@@ -222,7 +283,8 @@ class Context:
         changes = self.signals.changes()
         for number, on in changes:
             self.events.append(SignalChanged(number, on))
-            self.reactions.notice(number, on)
+            for reactions in (self.reactions, *(task.reactions for n, task in self.tasks.items() if n)):
+                reactions.notice(number, on)
         return bool(changes)
 
     def warn(self, warning: Warned) -> None:
@@ -277,6 +339,108 @@ class Context:
         """BRAKE, REACTI: stop the present motion at once."""
         self.braked = not self.arm.settled(now=self.now)
         self.arm.brake(now=self.now)
+
+    # Tasks.
+
+    @abstractmethod
+    def begin(
+        self, number: int, code: Code, arguments: list[VariableSlot], *, cycles: int, step: int, single: bool
+    ) -> RunningTask:
+        """Run a program as a task.
+
+        Raises:
+            ValError: If that task runs, or the main one wants the arm and another has it.
+        """
+
+    def abort_task(self, number: int) -> None:
+        """ABORT: a task that runs stands; the arm brakes if it's that task's."""
+        task = self.tasks.get(number)
+        if task is not None and task.state is ProgramState.RUNNING:
+            task.pause("ABORT")
+            if task.robot:
+                self.arm.brake(now=self.now)
+
+    def resume_task(self, number: int, *, again: bool, single: bool = False) -> None:
+        """PROCEED, RETRY, XSTEP: a task that stands goes on, with its next step or the one that was given up.
+
+        Raises:
+            ValError: If it doesn't stand, or wants the arm, and another has it.
+        """
+        task = self.standing_task(number)
+        self.require_free_arm(task)
+        if again and task.robot:
+            self.arm.retry(now=self.now)
+        task.go_on(again=again, single=single)
+
+    def kill_task(self, number: int) -> None:
+        """KILL: a task that stands can't go on any more."""
+        self.standing_task(number).end("KILL")
+
+    def finish_task(self, number: int) -> None:
+        """DONE, CYCLE.END: the present cycle of a task is its last.
+
+        Raises:
+            ValError: If it doesn't run.
+        """
+        task = self.tasks.get(number)
+        if task is None or task.state is not ProgramState.RUNNING:
+            raise ValError("No program running", f"task {number}" if number else "")
+        task.cycles = 1
+
+    def standing_task(self, number: int) -> RunningTask:
+        """A task that stands.
+
+        Raises:
+            ValError: If it doesn't.
+        """
+        task = self.tasks.get(number)
+        if task is None or task.state is not ProgramState.PAUSED:
+            raise ValError("No program to proceed", f"task {number}" if number else "")
+        return task
+
+    def task_number(self, number: float) -> int:
+        """The number of a task.
+
+        Raises:
+            ValError: If there's no such task.
+        """
+        if number not in TASKS:
+            raise ValError("Illegal task number", f"{number:.9g}: 0 to {TASKS[-1]}")
+        return int(number)
+
+    def task_state(self, number: int) -> float:
+        """TASK: 0 where nothing has run, 1 at an end, 2 after an error, 3 while it stands, 4 while it runs."""
+        task = self.tasks.get(number)
+        if task is None or task.state is not ProgramState.PAUSED:
+            return 0.0 if task is None else 1.0 if task.state is ProgramState.IDLE else 4.0
+        return 2.0 if task.word == "ERROR" else 3.0
+
+    def arm_holder(self) -> RunningTask | None:
+        """The task that has the arm."""
+        running = (task for task in self.tasks.values() if task.state is ProgramState.RUNNING)
+        return next((task for task in running if task.robot), None)
+
+    def require_free_arm(self, task: RunningTask) -> None:
+        """See that a task may have the arm, if it wants it.
+
+        Raises:
+            ValError: If another has it.
+        """
+        holder = self.arm_holder()
+        if task.robot and holder is not None and holder is not task:
+            raise ValError("Robot attached", f"to task {holder.number}; allowed: DETACH there first")
+
+    def require_arm(self, word: str) -> None:
+        """Instructions that move the arm, or change how it moves, ask this first.
+
+        Raises:
+            ValError: If the task whose steps are done hasn't attached the arm.
+        """
+        task, holder = self.task, self.arm_holder()
+        if task is None or holder is task or (task.robot and holder is None):
+            return
+        where = "the arm is detached" if holder is None else f"task {holder.number} has the arm"
+        raise ValError("Robot not attached", f"{word} in task {task.number}; {where}; allowed: ATTACH first")
 
     def powered(self) -> None:
         """Motions ask this first.

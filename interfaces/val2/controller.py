@@ -12,11 +12,13 @@ from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from typing_extensions import override
+
 from interfaces.val2.compiler import compiled, runs_beside_program, standalone_error
-from interfaces.val2.context import Context, Event, ProgramFailed
+from interfaces.val2.context import Code, Context, Event, ProgramFailed, ProgramState, Warned
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
-from interfaces.val2.interpreter import ProgramState, Task
+from interfaces.val2.interpreter import Task
 from interfaces.val2.memory import LONGEST_STRING, VariableSlot
 from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import SignalRule
@@ -26,6 +28,7 @@ from interfaces.val2.syntax import (
     Step,
     Variable,
 )  # fmt: skip
+from interfaces.val2.units import Units
 from interfaces.val2.values import Value
 
 STATEMENT: Final = 2e-6
@@ -62,6 +65,7 @@ class Controller(Context):
         *,
         parameters: MutableMapping[str, float] | None = None,
         rng: random.Random | None = None,
+        units: Units | None = None,
         now: float = 0.0,
     ) -> None:
         """Join what a controller needs.
@@ -70,11 +74,15 @@ class Controller(Context):
             arm: What moves.
             parameters: Shared with the arm where it reads some; those that are missing are added.
             rng: Of RANDOM.
+            units: Files of programs; none unless given.
             now: Session time [s]; timers begin here.
         """
         super().__init__(arm, compiled, now=now)
         if rng is not None:
             self.rng = rng
+        if units is not None:
+            self.units = units
+        self.units.warn = lambda text: self.warn(Warned(text))
         if parameters is not None:
             for name, value in self.parameters.items():
                 parameters.setdefault(name, value)
@@ -82,24 +90,29 @@ class Controller(Context):
         self.timers = [now] * len(self.timers)
         self.cell: tuple[SignalRule, ...] = ()
         """What sets the inputs; begins anew at every EXECUTE."""
-        self._program: Task | None = None
+        self.tasks = self._tasks = dict[int, Task]()
         self._do: Task | None = None
         self._busy = now
         self._due = False
 
     @property
     def running(self) -> bool:
-        """Whether a program runs."""
-        return self._program is not None and self._program.state is ProgramState.RUNNING
+        """Whether the main program runs."""
+        return 0 in self._tasks and self._tasks[0].state is ProgramState.RUNNING
 
     @property
     def doing(self) -> bool:
         """Whether a DO is under way."""
         return self._do is not None
 
-    def status(self) -> ControllerStatus:
-        """What the program does."""
-        task = self._program
+    @property
+    def busy(self) -> bool:
+        """Whether any program runs."""
+        return any(task.state is ProgramState.RUNNING for task in self._tasks.values())
+
+    def status(self, number: int = 0) -> ControllerStatus:
+        """What a task does, the main program unless another is asked for."""
+        task = self._tasks.get(number)
         if task is None:
             return ControllerStatus(ProgramState.IDLE)
         stack = tuple((f.name, f.step) for f in task.frames)
@@ -115,9 +128,10 @@ class Controller(Context):
         cycles: int = 1,
         step: int = 1,
         single: bool = False,
+        number: int = 0,
         now: float,
     ) -> None:
-        """EXECUTE, XSTEP: run a program.
+        """EXECUTE, XSTEP, PCEXECUTE: run a program.
 
         Args:
             name: The program.
@@ -125,24 +139,35 @@ class Controller(Context):
             cycles: How often; negative for ever.
             step: First step, from 1.
             single: Whether it pauses after each step.
+            number: As which task.
             now: Session time [s].
 
         Raises:
-            ValError: If one runs, or this one is missing or not right.
+            ValError: If one runs there, or this one is missing or not right.
         """
-        self._free()
         self.now = max(now, self.now)
+        self._require_idle(number)
         code = self.code(name)
         x = Expressions(self)
         slots = [x.reference(a)([]) if isinstance(a, Variable) else VariableSlot(x.value(a)([])) for a in arguments]
-        task = Task(self, code, slots, cycles=cycles, step=step, single=single)
-        values = [self._condition(rule) for rule in self.cell]
-        self.arm.begin_program()
-        self.reactions.clear()
-        self.warned.clear()
-        self.stop_first = False
-        self._program, self._due = task, True
-        self.signals.begin(self.cell, values, now=self.now)
+        self.begin(number, code, slots, cycles=cycles, step=step, single=single)
+
+    @override
+    def begin(
+        self, number: int, code: Code, arguments: list[VariableSlot], *, cycles: int, step: int, single: bool
+    ) -> Task:
+        self._require_idle(number)
+        task = Task(self, code, arguments, cycles=cycles, step=step, single=single, number=number)
+        self.require_free_arm(task)
+        if number == 0:
+            values = [self._condition(rule) for rule in self.cell]
+            self.arm.begin_program()
+            self.reactions.clear()
+            self.warned.clear()
+            self.stop_first = False
+            self.signals.begin(self.cell, values, now=self.now)
+        self._tasks[number], self._due = task, True
+        return task
 
     def _condition(self, rule: SignalRule) -> Callable[[], bool]:
         """What a rule follows; false where its expression has no value."""
@@ -195,24 +220,34 @@ class Controller(Context):
             self._do = None
             self._due = True
 
-    def abort(self, *, now: float) -> None:
+    def abort(self, number: int = 0, *, now: float) -> None:
         """ABORT: the arm brakes within its limits; a program stands, and can go on; a DO is over."""
         self.now = max(now, self.now)
-        if self._do is not None:
+        self._due = True
+        if number:
+            self.abort_task(number)
+        elif self._do is not None:
             self._do.end("ABORT")
             self._do = None
-        elif self._program is not None and self.running:
-            self._program.pause("ABORT")
-        self._due = True
-        self.arm.brake(now=self.now)
+        elif self.running:
+            self._tasks[0].pause("ABORT")
+        if not number:
+            self.arm.brake(now=self.now)
+
+    def abort_all(self, *, now: float) -> None:
+        """Stop what runs: all tasks, and the arm."""
+        for task in self._active():
+            if task.number:
+                self.abort(task.number, now=now)
+        self.abort(now=now)
 
     def interrupt(self, error: ValError, *, now: float) -> None:
-        """Give up what runs, for a reason that isn't its own: a program stands, and RETRY may go on; a DO is over.
+        """Give up what moves the arm, for a reason that isn't its own: a program stands, and RETRY may go on.
 
-        The arm isn't told to stop: somebody else does that, or has other plans.
+        A DO is over. The arm isn't told to stop: somebody else does that, or has other plans.
         """
         self.now = max(now, self.now)
-        task = self._active()
+        task = self._do or next((t for t in self._active() if t.robot), None)
         if task is None:
             return
         task.fail(error)
@@ -220,45 +255,46 @@ class Controller(Context):
         self._due = True
         self.arm.give_up(now=self.now)
 
-    def proceed(self, *, single: bool = False, now: float) -> None:
+    def proceed(self, number: int = 0, *, single: bool = False, now: float) -> None:
         """PROCEED, XSTEP: go on, with the next step where one was given up.
 
         Args:
+            number: The task.
             single: Whether it pauses after that step.
             now: Session time [s].
 
         Raises:
             ValError: If there's nothing to go on with.
         """
-        self._paused(now).go_on(again=False, single=single)
+        self._wake(number, now)
+        self.resume_task(number, again=False, single=single)
 
-    def retry(self, *, now: float) -> None:
+    def retry(self, number: int = 0, *, now: float) -> None:
         """RETRY: go on, with the motion and the step that were given up.
 
         Raises:
             ValError: If there's nothing to go on with.
         """
-        task = self._paused(now)
-        self.arm.retry(now=self.now)
-        task.go_on(again=True)
+        self._wake(number, now)
+        self.resume_task(number, again=True)
 
-    def kill(self, *, now: float) -> None:
+    def kill(self, number: int = 0, *, now: float) -> None:
         """KILL: what stands can't go on any more.
 
         Raises:
             ValError: If nothing does.
         """
-        self._paused(now).end("KILL")
+        self._wake(number, now)
+        self.kill_task(number)
 
-    def finish(self) -> None:
+    def finish(self, number: int = 0, *, now: float) -> None:
         """DONE: the present cycle of a program is its last.
 
         Raises:
-            ValError: If none runs.
+            ValError: If it doesn't run.
         """
-        if self._program is None or not self.running:
-            raise ValError("No program running")
-        self._program.cycles = 1
+        self.now = max(now, self.now)
+        self.finish_task(number)
 
     def answer(self, text: str, *, now: float) -> None:
         """A line for the PROMPT that asked.
@@ -288,29 +324,36 @@ class Controller(Context):
         Raises:
             ValError: If a program runs.
         """
-        self._free()
-        self._program = None
+        if self.busy or self._do is not None:
+            raise ValError("Program already running")
+        self._tasks.clear()
         self.memory.clear()
         self.compiled.clear()
         self.signals.reset()
         self._due = True
 
-    def _free(self) -> None:
-        if self.running or self._do is not None:
-            raise ValError("Program already running")
+    def _require_idle(self, number: int) -> None:
+        """See that nothing runs as a task.
 
-    def _paused(self, now: float) -> Task:
-        self._free()
-        if self._program is None or self._program.state is not ProgramState.PAUSED:
-            raise ValError("No program to proceed")
+        Raises:
+            ValError: If something does.
+        """
+        task = self._tasks.get(number)
+        if (task is not None and task.state is ProgramState.RUNNING) or (number == 0 and self._do is not None):
+            raise ValError("Program already running", f"task {number}" if number else "")
+
+    def _wake(self, number: int, now: float) -> None:
+        """See that a task stands, and look after all of them."""
+        self._require_idle(number)
         self.now = max(now, self.now)
         self._due = True
-        return self._program
 
     # Time.
 
-    def _active(self) -> Task | None:
-        return self._do or (self._program if self.running else None)
+    def _active(self) -> list[Task]:
+        """What runs."""
+        running = [task for _, task in sorted(self._tasks.items()) if task.state is ProgramState.RUNNING]
+        return running if self._do is None else [self._do, *running]
 
     def advance(self, *, now: float) -> tuple[Event, ...]:
         """Let time come to now.
@@ -325,17 +368,20 @@ class Controller(Context):
         self.signals.advance(now=now)
         self.arm.renew(now=now)
         self._due |= self.notice()
-        task = self._active()
-        if task is None:
+        active = self._active()
+        if not active:
             self._due = False
         elif self._busy <= now:
             self._due = False
-            start = now if task.waiting else max(self._busy, now - (MOST_AT_ONCE - TURN) * STATEMENT)
-            done = task.run(TURN + round((now - start) / STATEMENT))
+            waits = all(task.waiting for task in active)
+            start = now if waits else max(self._busy, now - (MOST_AT_ONCE - TURN) * STATEMENT)
+            share = (TURN + round((now - start) / STATEMENT)) // len(active)
+            done = sum(task.run(share) for task in active if task.state is ProgramState.RUNNING)
             self._busy = start + done * STATEMENT
             self.signals.advance(now=now)
-            self._due |= self.notice()
-            if task is self._do and task.state is not ProgramState.RUNNING:
+            # What one has done, others may wait for.
+            self._due |= self.notice() or (done > 0 and len(active) > 1)
+            if self._do is not None and self._do.state is not ProgramState.RUNNING:
                 self._do = None
         events = tuple(self.events)
         self.events.clear()
@@ -345,9 +391,11 @@ class Controller(Context):
         """When `advance` has something to do [s]: a time that is over for at once, infinity for never."""
         if self.events or self.signals.changed:
             return self.now
-        task = self._active()
-        if task is None:
+        active = self._active()
+        if not active:
             wanted = self.now if self._due else math.inf
+        elif self._due or not all(task.waiting for task in active):
+            wanted = self._busy
         else:
-            wanted = max(self._busy, task.next_deadline() if task.waiting and not self._due else self._busy)
+            wanted = max(self._busy, min(task.next_deadline() for task in active))
         return min(wanted, self.signals.next_deadline(), self.arm.renewal())

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from interfaces.val2 import formats
-from interfaces.val2.context import Context, Warned
+from interfaces.val2.context import Context
 from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.functions import FUNCTIONS, TRUE, row_of
 from interfaces.val2.memory import MOST_DIMENSIONS, Key, Slots, VariableSlot, index, mismatch, undefined
@@ -232,8 +232,6 @@ class Expressions:
     def _function(self, e: Apply, alike: Kind | None = None) -> Closure:
         """A closure of a function or an operator, of the kind that its row gives; its operands are of a kind."""
         row, given = row_of(e), e.arguments
-        if "idle" in row.tags:
-            return self.idle(e, "" if row.gives == "string" else 0.0)
         if row.act is None:
             return _placed(OF_NAMES[row.name](self, e), [lambda s: s], e.at)
         if row.repeats and row.slots[-1].default is None:
@@ -249,16 +247,6 @@ class Expressions:
         if "dialect" in row.tags:
             return _placed(partial(act, self.dialect), parts, e.at)
         return _placed(act, parts, e.at) if parts else _constant(act())
-
-    def idle(self, e: Apply, value: float | str) -> Closure:
-        """Of files and other tasks: 0 or an empty string, with a warning."""
-        warning = Warned(f"{e.function} has no meaning here")
-
-        def nothing(_: Slots) -> float | str:
-            self.context.warn(warning)
-            return value
-
-        return nothing
 
 
 def _constant(value: Any) -> Closure:

@@ -23,13 +23,10 @@ __all__ = [
 OPERATORS: Final = {row.name: row.help for row in functions.OPERATORS.values() if row.name.isalpha()}
 """Operators that are words."""
 
-_ONE_TASK: Final = "there is one program at a time; allowed: CALL program"
 UNAVAILABLE: Final = {
-    **dict.fromkeys(("ABORT", "CYCLE.END", "EXECUTE", "KILL", "PRIME", "PROCEED", "RETRY"), _ONE_TASK),
     **dict.fromkeys(("CLEAR.EVENT", "SET.EVENT"), "there are no events; allowed: SIGNAL number, WAIT SIG(number)"),
     **dict.fromkeys(("REACTE", "RETURNE"), "an error stops the program"),
     "MC": "commands are the monitor's",
-    "READ": "there are no files; allowed: PROMPT text, variable",
     "RUNSIG": "allowed: SIGNAL number",
     "WEAVE": "allowed: MOVES location",
     "WINDOW": "there is no conveyor",
@@ -37,11 +34,10 @@ UNAVAILABLE: Final = {
 """Keywords without whose work a program would do something else: an error where it comes there, and why."""
 
 IGNORED: Final = UNAVAILABLE.keys() | {
-    "ATTACH", "DETACH", "DISABLE.EVENT", "ENABLE.EVENT", "FCLOSE", "FCMND", "FDELETE", "FEMPTY", "FOPEN", "FOPENA",
-    "FOPEND", "FOPENR", "FOPENW", "FSEEK", "FSET", "INTOFF", "INTON", "MULTIPLE", "NOOVERLAP", "OVERLAP",
-    "RELEASE", "SELECT", "SINGLE", "UNLOCK", "WRITE",
+    "DISABLE.EVENT", "ENABLE.EVENT", "FCMND", "FOPEN", "FOPEND", "FSEEK", "FSET", "INTOFF", "INTON", "MULTIPLE",
+    "NOOVERLAP", "OVERLAP", "RELEASE", "SELECT", "SINGLE", "UNLOCK",
 }  # fmt: skip
-"""Keywords that are recognised but have no meaning here, with those: files, welding, other tasks."""
+"""Keywords that are recognised but have no meaning here, with those."""
 
 _NOT_HERE: Final = frozenset(
     {"CALIBRATE", "ERROR", "ESTOP", "JHERE", "JMOVE", "MCS", "ROBOT", "SEE", "SWITCH", "TIME"}

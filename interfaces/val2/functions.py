@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
+import struct
 from collections.abc import Callable
 from typing import Final
 
@@ -19,6 +20,7 @@ from interfaces.val2.formats import checked, leading_number
 from interfaces.val2.rows import Form
 from interfaces.val2.signals import group
 from interfaces.val2.syntax import Apply
+from interfaces.val2.units import MESSAGES
 from interfaces.val2.values import (
     NULL,
     Dialect,
@@ -193,6 +195,33 @@ def _state(c: Context, select: float) -> float:
     return (5.0 if c.braked else 1.0) + c.arm.settled(now=c.now)
 
 
+def _bytes(layout: str, value: float) -> str:
+    try:
+        return struct.pack(layout, value).decode("latin-1")
+    except (struct.error, OverflowError):
+        raise ValError("Illegal value", f"{value:.9g}: four characters hold less") from None
+
+
+def _of_bytes(layout: str, text: str, first: float) -> float:
+    i = whole(first) - 1
+    piece = text[i : i + 4].encode("latin-1", errors="replace") if i >= 0 else b""
+    if len(piece) < 4:
+        raise ValError("Illegal value", f"four characters from {i + 1} on are wanted; the string has {len(text)}")
+    return checked(float(struct.unpack(layout, piece)[0]))
+
+
+def _task(c: Context, select: float, number: float) -> float:
+    if select not in (0.0, 1.0):
+        raise ValError("Illegal value", f"TASK({select:.9g}): 0 is this task's number, 1 a task's state")
+    return c.task_state(c.task_number(number)) if select else float(c.task.number if c.task is not None else 0)
+
+
+def _status(c: Context, program: str) -> float:
+    """Of several tasks the state of the one that does most."""
+    name = program.lower()
+    return max((c.task_state(n) for n, task in c.tasks.items() if task.program == name), default=0.0)
+
+
 _FUNCTIONS: Final = (
     # Of numbers.
     Form("ABS", "x -> real", "Absolute value.", "VAL-II", abs),
@@ -279,15 +308,24 @@ _FUNCTIONS: Final = (
          lambda c: c.arm.here(now=c.now).joints, tags="constant context"),
     Form("#DEST", "-> location", "Where the arm goes, as a precision point.", "V+",
          lambda c: c.arm.destination(now=c.now).joints, tags="constant context"),
-    # Of files and tasks, without meaning here.
-    Form("IOSTAT", "lun:any, mode:any? -> real", "State of a file.", "V+", tags="idle"),
-    Form("GETC", "lun:any, mode:any? -> real", "A character of a file.", "V+", tags="idle"),
-    Form("LNGB", "text:string, from:any? -> real", "An integer of bytes.", "V+", tags="idle"),
-    Form("FLTB", "text:string, from:any? -> real", "A number of bytes.", "V+", tags="idle"),
-    Form("TASK", "mode:any?, number:any? -> real", "State of a task.", "V+", tags="idle"),
-    Form("$ERROR", "code:any -> string", "Text of an error.", "V+", tags="idle"),
-    Form("$LNGB", "value:any -> string", "Bytes of an integer.", "V+", tags="idle"),
-    Form("$FLTB", "value:any -> string", "Bytes of a number.", "V+", tags="idle"),
+    # Of files, bytes and tasks.
+    Form("IOSTAT", "unit, select?=0 -> real", "1 if what was last wanted of a unit is done, else why not.", "V+",
+         lambda c, unit, _: c.units.status(unit), tags="context"),
+    Form("GETC", "unit, mode?=0 -> real", "Code of the next character of a file, or why there's none.", "V+",
+         lambda c, unit, _: c.units.character(whole(unit)), tags="context"),
+    Form("$ERROR", "code -> string", "Text of an error that IOSTAT gives.", "V+",
+         lambda code: MESSAGES.get(whole(code), f"*Error {code:.9g}*")),
+    Form("LNGB", "text:string, from?=1 -> real", "An integer of four characters, the highest first.", "V+",
+         lambda text, first: _of_bytes(">i", text, first)),
+    Form("FLTB", "text:string, from?=1 -> real", "A number of four characters.", "V+",
+         lambda text, first: _of_bytes(">f", text, first)),
+    Form("$LNGB", "value -> string", "Four characters of an integer.", "V+",
+         lambda value: _bytes(">i", whole(value))),
+    Form("$FLTB", "value -> string", "Four characters of a number.", "V+", lambda value: _bytes(">f", value)),
+    Form("TASK", "select?=0, task:task?=0 -> real", "Number of this task; 1: state of a task.", "V+", _task,
+         tags="context reading"),
+    Form("STATUS", "program:string -> real", "State of the task that runs a program, as TASK(1) has it.", "V+",
+         _status, tags="context reading"),
 )  # fmt: skip
 
 FUNCTIONS: Final[dict[str, Form]] = {row.name: row for row in _FUNCTIONS}

@@ -59,10 +59,13 @@ _OPERATOR: Final = frozenset({"INFIX", "SIGN", "EQUALS"})
 _SHOWN: Final = {
     "NUMBER": "a number", "STRING": "a string", "NAME": "a name", "FORMAT": "a format such as /F8.2",
     "LPAR": "'('", "RPAR": "')'", "LSQB": "'['", "RSQB": "']'", "COMMA": "','", "COLON": "':'", "EQUALS": "'='",
-    "SETTING": "a parameter", "MOTION": "a motion", "PROGRAM_NAME": "the name of a program", "$END": _END,
+    "SETTING": "a parameter", "MOTION": "a motion", "PROGRAM_NAME": "the name of a program", "TASK": "a task",
+    "$END": _END,
 }  # fmt: skip
 """Tokens as errors name them; others by the word that they are."""
-_UNTOLD: Final = frozenset({"COMMENT", "CALL_OF_NUMBERS", "_CHANNEL", "_LAST", "KIND", "REST", "UNIT", "BRACKETS"})
+_UNTOLD: Final = frozenset(
+    {"COMMENT", "CALL_OF_NUMBERS", "_CHANNEL", "_CLEAR", "_LAST", "KIND", "REST", "UNIT", "BRACKETS"}
+)
 """Tokens that errors don't name."""
 _PIECE: Final = re.compile(r"[#$]?[A-Za-z0-9][A-Za-z0-9_.]*|[=<>]+|.", re.DOTALL)
 """What errors quote."""
@@ -316,6 +319,8 @@ class _Trees:
         operands = [part for part in given if not type_of(part)]
         while operands and operands[-1] is None:
             operands.pop()
+        if row.rule == "group":
+            operands[-1:-1] = [None] * (len(row.slots) - len(operands))
         if row.name == "ACCEL" and (len(operands) == 3 or operands[:1] == [None]):
             operands = operands[1:]
         _count(row, operands)
@@ -324,6 +329,34 @@ class _Trees:
         made = [one for one in made if not isinstance(one, str)]
         built = Instruction(row.name, tuple(made), _words(row, words), _at(keyword), program=called)
         return _MEANT[row.name](built) if row.name in _MEANT else built
+
+    def tasks(self, parts: list[Any]) -> Instruction:
+        """A program that is run beside this one: the task, cycles and the first step come before its arguments."""
+        keyword, task, name, given, *numbers = parts
+        row = forms.INSTRUCTIONS[keyword.upper()]
+        if len(numbers) > 2:
+            raise ValError(TOO_MANY, f"allowed: {row.usage}")
+        number = (
+            task and self.variable([task, None])
+            if task and task[0].isalpha()
+            else task and Number(float(task.rstrip(":")), _at(task))
+        )
+        before = (number, *numbers, *[None] * (2 - len(numbers)))
+        called = self.call([keyword, name, given])
+        return replace(called, operands=(*before, *called.operands))
+
+    def unit(self, parts: list[Any]) -> list[Any]:
+        return parts
+
+    def device(self, parts: list[Any]) -> Instruction:
+        """What is done with a logical unit: operands in parentheses, then others."""
+        keyword, unit, *others = parts
+        row = forms.INSTRUCTIONS[keyword.upper()]
+        inside = [] if unit == [None] else unit or []
+        if len(inside) > row.inside:
+            raise ValError(TOO_MANY, f"allowed: {row.usage}")
+        padded = [*inside, *[None] * (row.inside - len(inside)), *others]
+        return self.statement([keyword, *padded])
 
     def timed(self, parts: list[Any]) -> Instruction:
         """`AT time`, or with a motion behind it."""

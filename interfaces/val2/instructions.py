@@ -13,9 +13,9 @@ and a CASE whose head was jumped over ends where the next VALUE comes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from functools import partial
-from typing import Any, Final, Protocol, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
 from interfaces.val2 import formats
 from interfaces.val2.context import (
@@ -24,6 +24,7 @@ from interfaces.val2.context import (
     SPECIAL,
     Action,
     Asked,
+    Code,
     Context,
     Ending,
     Invoke,
@@ -39,7 +40,7 @@ from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, 
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.motion.speeds import require
 from interfaces.val2.rows import Form, OperandSlot, Origin
-from interfaces.val2.signals import reaction_to
+from interfaces.val2.signals import Reactions, reaction_to
 from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
     Apply,
@@ -53,6 +54,7 @@ from interfaces.val2.syntax import (
     literal,
     parts,
 )
+from interfaces.val2.units import OURS, TERMINAL
 from interfaces.val2.values import NULL, Location, Transformation, about_z
 
 Do: TypeAlias = Callable[..., object]
@@ -89,8 +91,17 @@ class ProgramCompiler(Expressions):
         """Number of the slot in which the FOR at a step keeps its limits."""
         return self.kept.setdefault(n, self.names + len(self.kept))
 
-    def prepared(self, i: Instruction, do: Do, check: Do | None = None) -> Callable[[Slots], Ask]:
-        """What evaluates an instruction's operands, and checks them, and gives what then does it."""
+    def prepared(
+        self, i: Instruction, do: Do, check: Do | None = None, *, arm: bool = False
+    ) -> Callable[[Slots], Ask]:
+        """What evaluates an instruction's operands, and checks them, and gives what then does it.
+
+        Args:
+            i: The instruction.
+            do: Does it.
+            check: Raises where the operands can't be.
+            arm: Whether the task has to have the arm.
+        """
         slots, c = STATEMENTS[i.keyword].slots, self.context
         if i.keyword == "BASE" and stands_for_frame(i):
             slots = (OperandSlot("transformation", "frame"),)
@@ -98,6 +109,8 @@ class ProgramCompiler(Expressions):
 
         def prepare(s: Slots) -> Ask:
             given = [value(s) for value in values]
+            if arm:
+                c.require_arm(i.keyword)
             if check is not None:
                 check(c, i, *given)
             return lambda: do(c, i, *given)
@@ -127,6 +140,11 @@ def stands_for_frame(i: Instruction) -> bool:
         case (Apply(name),):
             return name not in OPERATORS
     return len(i.operands) == 1
+
+
+def reactions_of(c: Context) -> Reactions:
+    """Those of the task whose step is done."""
+    return c.reactions if c.task is None else c.task.reactions
 
 
 # What is done, of values.
@@ -162,6 +180,7 @@ def _speed(c: Context, i: Instruction, speed: float, turn: float | None) -> None
         c.capped("Monitor SPEED", speed)
         c.arm.set_monitor_speed(speed, now=c.now)
         return
+    c.require_arm(i.keyword)
     unit = next((u for u in ("MMPS", "IPS") if u in i.words), "%")
     c.capped("SPEED", speed, c.arm.fastest(unit), unit)
     c.arm.set_speed(speed, turn=turn, unit=unit, always=_always(i))
@@ -243,13 +262,104 @@ def _base(c: Context, _: Instruction, first: float | Transformation, *others: fl
 def _lock(c: Context, _: Instruction, priority: float) -> None:
     """Reactions have the lowest priority above 0, so that any priority above 0 defers all of them."""
     require(priority >= 0.0, priority, "a priority is 0 or above")
-    c.reactions.locked = priority > 0.0
+    reactions_of(c).locked = priority > 0.0
+
+
+def _take_arm(c: Context, following: int) -> Pause[int]:
+    """ATTACH of the arm: wait until no other task has it."""
+    task = c.task
+    assert task is not None
+    task.attaching = True
+    try:
+        while c.arm_holder() not in (None, task):
+            yield c.now + SLICE
+    finally:
+        task.attaching = False
+    task.robot = True
+    return following
+
+
+def _attach(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """ATTACH a logical unit; without a device and a number it's the arm."""
+    c, target = x.context, i.operands[0] if i.operands else None
+    unit, mode, device = x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
+    slot = x.reference(target) if isinstance(target, Variable) else None
+
+    def attach(s: Slots) -> Action:
+        given, kind = None if whole(mode(s)) & OURS else whole(unit(s)), device(s) or ""
+        if given == 0 and not kind:
+            return Waiting(_take_arm(c, n + 1))
+        number = c.units.attach(given, kind)
+        if given is None:
+            if slot is None:
+                raise ValError("Invalid argument", f"ATTACH with mode {OURS} gives a variable the unit's number")
+            assert isinstance(target, Variable)
+            c.memory.store(slot(s), float(number), target)
+        return n + 1
+
+    return x.special(attach)
+
+
+def _detach(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """DETACH; the arm when it stands."""
+    c, (unit,) = x.context, x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
+
+    def free() -> None:
+        if c.task is not None:
+            c.task.robot = False
+
+    def detach(s: Slots) -> Action:
+        number = whole(unit(s))
+        if number == 0:
+            return Waiting(_standing(c, free, n + 1))
+        c.units.detach(number)
+        return n + 1
+
+    return x.special(detach)
+
+
+def _read(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """READ a line of a file, or of the terminal."""
+    c, names = x.context, i.operands[3:]
+    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+    asking = _asking(x, names)
+    slots = [x.reference(v) for v in names]
+
+    def read(s: Slots) -> Action:
+        number, targets = whole(unit(s)), [slot(s) for slot in slots]
+        if number == TERMINAL:
+            return Waiting(asking("", targets, n + 1))
+        line = c.units.read(number)
+        values = None if line is None else _answers(line, names)
+        if line is not None and values is None:
+            c.units.refuse(number)
+        for slot, value, name in zip(targets, values or (), names, strict=False):
+            c.memory.store(slot, value, name)
+        return n + 1
+
+    return x.special(read)
+
+
+def _write(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    c, items = x.context, _items(x, i.operands[3:])
+    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+
+    def write(s: Slots) -> int:
+        text, number = items(s), whole(unit(s))
+        if number == TERMINAL:
+            c.events.append(Typed(text))
+        else:
+            c.units.write(number, text)
+        return c.go_on(n + 1)
+
+    return write
 
 
 # How it's waited for.
 
 
-Pause: TypeAlias = Generator[float, None, None]
+T = TypeVar("T")
+Pause: TypeAlias = Generator[float, None, T]
 _CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED", "STATE"}
 """Functions whose values change with time alone."""
 
@@ -260,7 +370,7 @@ class _Look(Protocol):
     def __call__(self, *, now: float) -> bool: ...
 
 
-def until(context: Context, look: _Look) -> Pause:
+def until(context: Context, look: _Look) -> Pause[None]:
     """Wait until what was asked is answered, and the arm is as it's to be.
 
     Args:
@@ -345,7 +455,7 @@ def _asked(
     """What is asked for, and waited for."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        c, prepare = x.context, x.prepared(i, do, check)
+        c, prepare = x.context, x.prepared(i, do, check, arm=i.keyword != "BRAKE")
         asks = prepare if i.begins is None else _timed(c, x.of_kind("real", i.begins), prepare)
         return x.special(lambda s: Waiting(wait(c, asks(s), n + 1)))
 
@@ -356,11 +466,11 @@ _motion: Final = partial(_asked, _moving)
 _at_rest: Final = partial(_asked, _standing)
 
 
-def _now(do: Do) -> Act:
+def _now(do: Do, *, arm: bool = False) -> Act:
     """What is done at once, and takes no time."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        prepare = x.prepared(i, do)
+        prepare = x.prepared(i, do, arm=arm)
 
         def done(s: Slots) -> int:
             prepare(s)()
@@ -371,11 +481,15 @@ def _now(do: Do) -> Act:
     return act
 
 
+_setting: Final = partial(_now, arm=True)
+"""What changes how the arm moves."""
+
+
 def _alteration(do: Do) -> Act:
     """What is asked for at once; then a program waits: ALTOUT for its period, NOALTER until the arm stands."""
 
     def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-        prepare, ends = x.prepared(i, do), i.keyword != "ALTOUT" and len(i.operands) <= 2
+        prepare, ends = x.prepared(i, do, arm=True), i.keyword != "ALTOUT" and len(i.operands) <= 2
 
         def alter(s: Slots) -> Waiting:
             ask = prepare(s)
@@ -388,8 +502,13 @@ def _alteration(do: Do) -> Act:
 
 
 def _end_run(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    """PAUSE, STOP, HALT, when the arm stands."""
-    return x.special(lambda _: Waiting(_standing(x.context, lambda: None, Ending(i.keyword, n + 1))))
+    """PAUSE, STOP, HALT, when the arm stands, if it's the task's."""
+    c, ending = x.context, Ending(i.keyword, n + 1)
+
+    def end(_: Slots) -> Action:
+        return ending if c.task is not None and not c.task.robot else Waiting(_standing(c, lambda: None, ending))
+
+    return x.special(end)
 
 
 def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -461,7 +580,11 @@ def _grasp(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
             raise ValError("Nothing in the hand", f"it's open by less than {opening:.9g} mm")
         return label
 
-    return x.special(lambda s: Waiting(grasping(least(s))))
+    def grasp(s: Slots) -> Waiting:
+        c.require_arm(i.keyword)
+        return Waiting(grasping(least(s)))
+
+    return x.special(grasp)
 
 
 # What a step does with the program.
@@ -559,9 +682,17 @@ def _case(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     return choose
 
 
-def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    """Arguments are by reference where they're names, by value where they're anything else."""
-    context, at = x.context, i.at
+def arguments_of(i: Instruction) -> tuple[Any, ...]:
+    """What an instruction that calls a program, or runs it beside, gives it."""
+    return i.operands[3:] if STATEMENTS[i.keyword].rule == "tasks" else i.operands
+
+
+def _called(x: ProgramCompiler, i: Instruction) -> Callable[[Slots], tuple[Code, list[VariableSlot]]]:
+    """The program that an instruction calls, and its arguments.
+
+    They're by reference where they're names, by value where they're anything else.
+    """
+    context, at, operands = x.context, i.at, arguments_of(i)
 
     def argument(e: Expression | None) -> Callable[[Slots], VariableSlot]:
         if e is None:
@@ -571,17 +702,43 @@ def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
         value = x.value(e)
         return lambda s: VariableSlot(value(s))
 
-    given = [argument(a) for a in i.operands]
-    prefixes = [None if a is None else {"string": "$", "point": "#"}.get(kind_of(a), "") for a in i.operands]
+    given = [argument(a) for a in operands]
+    prefixes = [None if a is None else {"string": "$", "point": "#"}.get(kind_of(a), "") for a in operands]
 
-    def invoke(s: Slots) -> Invoke:
+    def called(s: Slots) -> tuple[Code, list[VariableSlot]]:
         code = context.code(i.program, at)
         for prefix, parameter in zip(prefixes, code.program.parameters, strict=False):
             if prefix is not None and prefix != parameter.prefix:
                 raise ValError("Variable type mismatch", f"argument {parameter.name}", place=at)
-        return Invoke(code, code.slots([slot(s) for slot in given]), n + 1)
+        return code, [slot(s) for slot in given]
+
+    return called
+
+
+def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    called = _called(x, i)
+
+    def invoke(s: Slots) -> Invoke:
+        code, arguments = called(s)
+        return Invoke(code, code.slots(arguments), n + 1)
 
     return x.special(invoke)
+
+
+def _execute(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """EXECUTE, PCEXECUTE; PRIME, which stands before the first step."""
+    c, called = x.context, _called(x, i)
+    numbers = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+
+    def execute(s: Slots) -> int:
+        task, cycles, step = (number(s) for number in numbers)
+        code, arguments = called(s)
+        begun = c.begin(c.task_number(task), code, arguments, cycles=whole(cycles), step=whole(step), single=False)
+        if i.keyword == "PRIME":
+            begun.pause("PRIME")
+        return n + 1
+
+    return x.special(execute)
 
 
 def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -591,7 +748,7 @@ def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
         if i.program:
             context.code(i.program, i.at)
         immediate = i.keyword == "REACTI"
-        context.reactions.add(reaction_to(signal(s), i.program, immediate=immediate, always=_always(i)))
+        reactions_of(context).add(reaction_to(signal(s), i.program, immediate=immediate, always=_always(i)))
         return n + 1
 
     return watch
@@ -658,27 +815,40 @@ def _decompose(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 # Dialogue.
 
 
+def _items(x: ProgramCompiler, operands: tuple[Any, ...]) -> Callable[[Slots], str]:
+    """The text of items, with a line end if it has one."""
+    items = [o if isinstance(o, Format) else x.value(o) for o in operands]
+
+    def text(s: Slots) -> str:
+        shown, ends = formats.spelled([o if isinstance(o, Format) else o(s) for o in items], x.dialect)
+        return shown + "\n" if ends else shown
+
+    return text
+
+
 def _type(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    context = x.context
-    items = [o if isinstance(o, Format) else x.value(o) for o in i.operands]
+    context, items = x.context, _items(x, i.operands)
 
     def type_(s: Slots) -> int:
-        text, ends = formats.spelled([o if isinstance(o, Format) else o(s) for o in items], x.dialect)
+        text = items(s)
         if context.switches["MESSAGES"]:
-            context.events.append(Typed(text + "\n" if ends else text))
+            context.events.append(Typed(text))
         return context.go_on(n + 1)
 
     return type_
 
 
-def _prompt(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    """Ask, and ask again until the answer is what is wanted."""
-    context, text, names = x.context, x.of_kind("string", i.operands[0]), i.operands[1:]
-    slots = [x.reference(v) for v in names]
+def _asking(
+    x: ProgramCompiler, names: tuple[Variable, ...]
+) -> Callable[[str, list[VariableSlot], int], Pause[int]]:
+    """Ask for values, when no other task asks, and ask again until the answer is what is wanted."""
+    context = x.context
     if any(v.prefix == "#" for v in names):
         raise mismatch(next(v for v in names if v.prefix == "#"))
 
-    def asking(question: str, targets: list[VariableSlot]) -> Generator[float, None, int]:
+    def asking(question: str, targets: list[VariableSlot], following: int) -> Pause[int]:
+        while context.asking:
+            yield context.now + SLICE
         context.answers.clear()
         context.asking = True
         try:
@@ -694,9 +864,15 @@ def _prompt(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
             context.asking = False
         for slot, value, name in zip(targets, values, names, strict=True):
             context.memory.store(slot, value, name)
-        return n + 1
+        return following
 
-    return x.special(lambda s: Waiting(asking(text(s), [slot(s) for slot in slots])))
+    return asking
+
+
+def _prompt(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    text, names = x.of_kind("string", i.operands[0]), i.operands[1:]
+    slots, asking = [x.reference(v) for v in names], _asking(x, names)
+    return x.special(lambda s: Waiting(asking(text(s), [slot(s) for slot in slots], n + 1)))
 
 
 def _answers(line: str, names: tuple[Variable, ...]) -> list[float | str] | None:
@@ -734,6 +910,15 @@ def _movement(
     return Form(name, spelled, explanation, origin, _motion(do, check), rule="motion")
 
 
+def _of_tasks(name: str, pc: str, explanation: str, do: Callable[[Context, int], None]) -> Iterator[Form]:
+    """The rows of V+ and of VAL-II's process control of what is done to another task."""
+    act = _now(lambda c, _, number: do(c, c.task_number(number)))
+    yield Form(name, "task:task?=0", explanation, "V+", act, tags="beside")
+    if pc:
+        said = explanation.replace("a task", "a process control program", 1)
+        yield Form(pc, "task:task?=1", said, "VAL-II", act, tags="beside reading")
+
+
 _ROWS: Final = (
     # Motions.
     _movement("MOVE", "location:location", "Move to a location, the joints together.", _move),
@@ -761,29 +946,29 @@ _ROWS: Final = (
     Form("BREAK", "", "Wait until the arm stands at its destination.", "VAL-II", _at_rest(_nothing)),
     Form("BRAKE", "", "Stop the present motion at once.", "V+", _at_rest(_nothing, lambda c, _: c.brake())),
     Form("AT", "time:time", "The next motion begins at a time of the session [s].", "ours",
-         _now(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]", rule="timed"),
+         _setting(lambda c, _, t: c.arm.at(t)), usage="AT time [motion]", rule="timed"),
     # Settings.
     Form("SPEED", "speed:speed, turning:percent?",
          "Speed of the next motion, [%] of the nominal or of the tool; ALWAYS: of all.", "VAL", _now(_speed),
          words="MMPS|IPS|MONITOR ALWAYS", rule="speed", tags="beside"),
-    Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _now(_accelerate),
+    Form("ACCEL", "up:percent, down:percent?", "Accelerations: [%] of the nominal.", "V+", _setting(_accelerate),
          rule="channel"),
     Form("DURATION", "seconds:seconds", "Shortest time of the next motion; ALWAYS: each.", "V+",
-         _now(lambda c, i, t: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
-    Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", _now(_tolerance),
+         _setting(lambda c, i, t: c.arm.set_duration(t, always=_always(i))), words="ALWAYS"),
+    Form("COARSE", "percent?", "The next motion may end roughly; ALWAYS: each.", "VAL", _setting(_tolerance),
          words="ALWAYS"),
-    Form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", _now(_tolerance),
+    Form("FINE", "percent?", "The next motion ends exactly; ALWAYS: each.", "VAL-II", _setting(_tolerance),
          words="ALWAYS"),
     Form("NULL", "", "The next motion ends when the real arm is there; ALWAYS: each.", "VAL",
-         _now(lambda c, i: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
+         _setting(lambda c, i: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
     Form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
-         _now(lambda c, i: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
-    Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", _now(_configure)),
-    Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", _now(_configure)),
-    Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", _now(_configure)),
-    Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", _now(_configure)),
-    Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _now(_configure)),
-    Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _now(_configure)),
+         _setting(lambda c, i: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
+    Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", _setting(_configure)),
+    Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", _setting(_configure)),
+    Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", _setting(_configure)),
+    Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", _setting(_configure)),
+    Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
+    Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
     Form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
          _at_rest(lambda c, _, tool: c.arm.set_tool(NULL if tool is None else tool))),
     Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
@@ -809,11 +994,11 @@ _ROWS: Final = (
          _alteration(lambda c, _: c.arm.set_alter(None, now=c.now))),
     # Hand.
     Form("OPEN", "opening?", "Open the hand, or to an opening [mm], with the next motion.", "VAL",
-         _now(_hand_with_motion)),
+         _setting(_hand_with_motion)),
     Form("CLOSE", "opening?", "Close the hand, or to an opening [mm], with the next motion.", "VAL",
-         _now(_hand_with_motion)),
+         _setting(_hand_with_motion)),
     Form("RELAX", "", "Let the hand go slack with the next motion.", "VAL",
-         _now(lambda c, _: c.arm.set_hand(None))),
+         _setting(lambda c, _: c.arm.set_hand(None))),
     Form("OPENI", "opening?", "Open the hand, or to an opening [mm], now, where the arm stands.", "VAL",
          _at_rest(_hand_now, _check_hand)),
     Form("CLOSEI", "opening?", "Close the hand, or to an opening [mm], now, where the arm stands.", "VAL",
@@ -847,7 +1032,7 @@ _ROWS: Final = (
     Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
          words="ALWAYS"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
-         _now(lambda c, _, signal: c.reactions.ignore(signal))),
+         _now(lambda c, _, signal: reactions_of(c).ignore(signal))),
     Form("LOCK", "priority", "Let reactions wait, until LOCK 0 or the end of the one that says it.", "V+",
          _now(_lock)),
     # Control.
@@ -880,6 +1065,44 @@ _ROWS: Final = (
     Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
     Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
     Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
+    # Files.
+    Form("ATTACH", "unit?=0, mode?=0, device:string?", "Take a logical unit; without one the arm, when it's free.",
+         "V+", _attach, usage="ATTACH (unit, mode) [device]", rule="device"),
+    Form("DETACH", "unit?=0", "Give a logical unit back; without one the arm, when it stands.", "V+", _detach,
+         usage="DETACH (unit)", rule="device"),
+    *(Form(name, "unit, record?, mode?, file:string", f"Open a file {what}.", "V+",
+           _now(lambda c, i, unit, _r, _m, file: c.units.open(i.keyword, whole(unit), file)),
+           usage=f"{name} (unit, record, mode) file", rule="device")
+      for name, what in (("FOPENR", "to read"), ("FOPENW", "that isn't there, to write"),
+                         ("FOPENA", "to write at its end"))),
+    Form("FCLOSE", "unit", "Close a file; what was written is there then.", "V+",
+         _now(lambda c, _, unit: c.units.close(whole(unit))), usage="FCLOSE (unit)", rule="device"),
+    Form("FEMPTY", "unit", "Write out what is still to be written: at FCLOSE, here.", "V+", _now(lambda *_: None),
+         usage="FEMPTY (unit)", rule="device"),
+    Form("FDELETE", "unit, file:string", "Delete a file.", "V+",
+         _now(lambda c, _, unit, file: c.units.delete(whole(unit), file)), usage="FDELETE (unit) file",
+         rule="device"),
+    Form("READ", "unit, record?, mode?, variable:variable*", "Read values of the next line of a file, or terminal.",
+         "V+", _read, usage="READ (unit, record, mode) variable, ..", rule="device"),
+    Form("WRITE", "unit, record?, mode?, item:any?*", "Write a line to a file, or terminal, as TYPE does.", "V+",
+         _write, usage="WRITE (unit, record, mode) [item], ..", rule="device"),
+    # Tasks.
+    Form("EXECUTE", "task:task?=0, cycles?=1, step?=1, argument:any?*",
+         "Run a program as a task beside this one, so many cycles; -1: for ever.", "V+", _execute,
+         usage="EXECUTE [task] program(argument, ..)[, cycles[, step]]", rule="tasks", tags="beside"),
+    Form("PCEXECUTE", "task:task?=1, cycles?=1, step?=1, argument:any?*",
+         "Run a process control program beside this one, so many cycles; -1: for ever.", "VAL-II", _execute,
+         usage="PCEXECUTE [task] program(argument, ..)[, cycles[, step]]", rule="tasks", tags="beside reading"),
+    Form("PRIME", "task:task?=0, cycles?=1, step?=1, argument:any?*",
+         "Let a program stand before a step as a task; PROCEED runs it.", "V+", _execute,
+         usage="PRIME [task] program(argument, ..)[, cycles[, step]]", rule="tasks", tags="beside"),
+    *_of_tasks("ABORT", "PCABORT", "Stop a task at once; it can go on.", Context.abort_task),
+    *_of_tasks("PROCEED", "PCPROCEED", "Let a task that stands go on, with its next step.",
+               partial(Context.resume_task, again=False)),
+    *_of_tasks("RETRY", "PCRETRY", "Let a task that stands go on, with the step that it was at.",
+               partial(Context.resume_task, again=True)),
+    *_of_tasks("KILL", "", "Let a task that stands be at its end.", Context.kill_task),
+    *_of_tasks("CYCLE.END", "PCEND", "Let the present cycle of a task be its last.", Context.finish_task),
     # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
          rule="items"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any, Final
 
 from interfaces.val2.context import (
@@ -18,26 +17,17 @@ from interfaces.val2.context import (
     ProgramEnded,
     ProgramFailed,
     ProgramPaused,
+    ProgramState,
     Waiting,
 )
 from interfaces.val2.errors import ValError
 from interfaces.val2.instructions import until
 from interfaces.val2.memory import VariableSlot
-from interfaces.val2.signals import Reaction
+from interfaces.val2.signals import Reaction, Reactions
 from vrs.errors import VrsError
 
 MOST_CALLS: Final = 1_000
 """How deep programs may call each other."""
-
-
-class ProgramState(Enum):
-    """What a program does."""
-
-    IDLE = "idle"
-    """It has ended."""
-    RUNNING = "running"
-    PAUSED = "paused"
-    """It can go on: after PAUSE, ABORT, a single step or an error."""
 
 
 @dataclass(slots=True)
@@ -81,6 +71,7 @@ class Task:
         cycles: int,
         step: int = 1,
         single: bool = False,
+        number: int = 0,
     ) -> None:
         """Stand before a step.
 
@@ -91,6 +82,7 @@ class Task:
             cycles: How often it's run; negative for ever.
             step: The first step, from 1.
             single: Whether it pauses after each step.
+            number: Of the task; the main program's and a DO's is 0.
 
         Raises:
             ValError: If there's no such step, or there are too many arguments.
@@ -99,6 +91,8 @@ class Task:
             raise ValError("Invalid step", f"{step}: 1 to {len(code.program.steps)}", program=code.program.name)
         self.context, self.code, self.arguments = context, code, arguments
         self.cycles, self.single = cycles, single
+        self.number, self.robot, self.attaching = number, number == 0, False
+        self.reactions = Reactions() if number else context.reactions
         self.state = ProgramState.RUNNING
         self.word = ""
         """Why it paused or ended."""
@@ -106,6 +100,11 @@ class Task:
         """When a wait wants to be looked at again."""
         self._interrupted = False
         self.frames = [CallFrame(code, code.slots(arguments), pc=step - 1)]
+
+    @property
+    def program(self) -> str:
+        """What it was begun with; empty for a DO."""
+        return self.code.program.name
 
     @property
     def waiting(self) -> bool:
@@ -125,7 +124,7 @@ class Task:
         Returns:
             Steps that it did.
         """
-        done = 0
+        done, self.context.task = 0, self
         try:
             while done < most and self.state is ProgramState.RUNNING:
                 self._react()
@@ -142,6 +141,7 @@ class Task:
         except VrsError as error:
             self.fail(ValError("Motion error", str(error)))
         self.context.notice()
+        self.context.task = None
         return done
 
     def _compute(self, frame: CallFrame, most: int) -> int:
@@ -196,11 +196,11 @@ class Task:
     def _leave(self, frame: CallFrame) -> None:
         frame.drop()
         if len(self.frames) == 1:
-            frame.waiting = Waiting(_resting(self.context))
+            frame.waiting = Waiting(_resting(self.context, arm=self.robot))
             return
         self._release(self.frames.pop())
         if frame.level > self.frames[-1].level:
-            self.context.reactions.locked = False
+            self.reactions.locked = False
 
     def _release(self, frame: CallFrame) -> None:
         for slot in frame.slots[len(frame.code.program.parameters) : frame.code.names]:
@@ -209,12 +209,13 @@ class Task:
     def _finish(self, word: str) -> None:
         if word == "HALT" or self.cycles in (0, 1):
             self.cycles = 0
-            self.end(word if self.code.program.name else "DO")
+            self.end(word if self.program else "DO")
             return
         self._unwind()
         self.cycles = max(self.cycles - 1, -1)
         self.frames = [CallFrame(self.code, self.code.slots(self.arguments))]
-        self.context.arm.begin_program()
+        if self.robot:
+            self.context.arm.begin_program()
 
     def _unwind(self) -> None:
         for frame in self.frames:
@@ -228,7 +229,7 @@ class Task:
         self.context.notice()
         frame = self.frames[-1]
         amid = frame.waiting is not None and not frame.waiting.interruptible
-        reaction = self.context.reactions.due(max(frame.level, 1) if amid else frame.level)
+        reaction = self.reactions.due(max(frame.level, 1) if amid else frame.level)
         if reaction is not None:
             self._call(reaction, frame)
 
@@ -251,15 +252,15 @@ class Task:
         self._interrupted = frame.waiting is not None
         frame.drop()
         self.state, self.word = ProgramState.PAUSED, word
-        self.context.events.append(ProgramPaused(frame.name, frame.step, word))
+        self.context.events.append(ProgramPaused(frame.name, frame.step, word, self.number))
 
     def end(self, word: str) -> None:
         """End now."""
         self._unwind()
         self.state, self.word = ProgramState.IDLE, word
-        if self.code.program.name:  # A DO leaves what a paused program watches alone.
-            self.context.reactions.clear()
-        self.context.events.append(ProgramEnded(self.code.program.name, word))
+        if self.program:  # A DO leaves what a paused program watches alone.
+            self.reactions.clear()
+        self.context.events.append(ProgramEnded(self.program, word, self.number))
 
     def fail(self, error: ValError) -> None:
         """Stand at the present step, for an error."""
@@ -270,7 +271,7 @@ class Task:
             place = steps[frame.pc].at if frame.pc < len(steps) else None
             error = error.at(program=frame.name, step=frame.step, place=place)
         self.state, self.word, self._interrupted = ProgramState.PAUSED, "ERROR", True
-        self.context.events.append(ProgramFailed(error))
+        self.context.events.append(ProgramFailed(error, self.number))
 
     def go_on(self, *, again: bool, single: bool = False) -> None:
         """PROCEED, RETRY, XSTEP: run, from the next step or from the one that was given up."""
@@ -281,7 +282,8 @@ class Task:
         self.state, self.word, self.single = ProgramState.RUNNING, "", single
 
 
-def _resting(context: Context) -> Generator[float, None, Ending]:
-    """Wait for the arm to stand, and end."""
-    yield from until(context, context.arm.settled)
+def _resting(context: Context, *, arm: bool) -> Generator[float, None, Ending]:
+    """Wait for the arm to stand, if it's the task's, and end."""
+    if arm:
+        yield from until(context, context.arm.settled)
     return Ending("END")

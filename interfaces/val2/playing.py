@@ -9,6 +9,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from interfaces.val2.context import (
@@ -17,6 +18,7 @@ from interfaces.val2.context import (
     ProgramEnded,
     ProgramFailed,
     ProgramPaused,
+    ProgramState,
     SignalChanged,
     Typed,
     Warned,
@@ -25,6 +27,7 @@ from interfaces.val2.controller import STATEMENT, TURN, Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.source import SourceFile
+from interfaces.val2.units import Units
 from vrs.clock import ManualClock
 from vrs.engine import Engine
 from vrs.model import Array, RobotModel, home
@@ -51,7 +54,14 @@ class Player:
     """A controller that carries out the first program of a file, once."""
 
     def __init__(
-        self, source: SourceFile, arm: Arm, listeners: Listeners, rng: random.Random, *, skips: bool = False
+        self,
+        source: SourceFile,
+        arm: Arm,
+        listeners: Listeners,
+        rng: random.Random,
+        *,
+        units: Units | None = None,
+        skips: bool = False,
     ) -> None:
         """Load the file.
 
@@ -60,6 +70,7 @@ class Player:
             arm: What moves.
             listeners: Who hears what the program says.
             rng: Of RANDOM.
+            units: Its files; none unless given.
             skips: Whether it goes on after what it can't reach, and after PAUSE.
 
         Raises:
@@ -72,8 +83,8 @@ class Player:
         """What stopped it, or what it went on after."""
         self.given_up: ValError | None = None
         """Why it was ended, for a reason of its surroundings."""
-        self.done = False
-        self._controller = controller = Controller(arm, parameters=arm.parameters, rng=rng)
+        self.done = self._ended = False
+        self._controller = controller = Controller(arm, parameters=arm.parameters, rng=rng, units=units)
         for program in source.programs:
             controller.memory.programs[program.name] = program
         for entry in source.values:
@@ -92,6 +103,7 @@ class Player:
         """Do what is due by now [s]."""
         for event in self._controller.advance(now=now):
             self._take(event, now)
+        self.done |= self._ended and not self._goes_on()
 
     def next_deadline(self) -> float:
         """When something is due [s]; infinity where nothing will ever be."""
@@ -123,23 +135,32 @@ class Player:
                     self._give_up(ValError("No answer", f"nobody answers {question!r}"), now)
                 else:
                     self._controller.answer(line, now=now)
-            case ProgramFailed(error):
+            case ProgramFailed(error, task):
                 self.errors.append(error)
-                self._go_on(now, error.what in _OUT_OF_REACH)
-            case ProgramPaused(program, step, word):
-                if not self.done and not self._go_on(now, True):
+                self._go_on(task, now, error.what in _OUT_OF_REACH)
+            case ProgramPaused(program, step, word, task):
+                if word in ("ABORT", "PRIME"):
+                    self._ended |= task == 0
+                elif not self.done and not self._go_on(task, now, True):
                     self._listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
+            case ProgramEnded(task=0):
+                self._ended = True
             case ProgramEnded():
-                self.done = True
+                pass
             case SignalChanged():
                 pass
 
-    def _go_on(self, now: float, may: bool) -> bool:
+    def _go_on(self, task: int, now: float, may: bool) -> bool:
         if self._skips and may:
-            self._controller.proceed(now=now)
+            self._controller.proceed(task, now=now)
             return True
-        self.done = True
+        self.done |= task == 0
         return False
+
+    def _goes_on(self) -> bool:
+        """Whether the main program runs, or another that has the arm, or waits for nothing else."""
+        running = [task for task in self._controller.tasks.values() if task.state is ProgramState.RUNNING]
+        return any(not task.number or task.robot or task.attaching or not task.waiting for task in running)
 
     def place(self, error: ValError) -> TextPosition | None:
         """Where in the file an error happened; None where that's unknown."""
@@ -179,6 +200,7 @@ def rehearse(
     limit: float = LONGEST,
     listeners: Listeners | None = None,
     start: Array | None = None,
+    files: Path | None = None,
 ) -> Rehearsal:
     """Carry out the first program of a file, once.
 
@@ -191,11 +213,13 @@ def rehearse(
         limit: When the program is given up [s].
         listeners: Who hears what it says; nobody by default.
         start: Where the arm stands [rad], (n,); in its `nominal` pose unless given.
+        files: Where the program's files are; what it writes doesn't get there.
     """
     now, computed, clock = 0.0, 0.0, ManualClock(0.0)
     engine = Engine(model, q=home(model) if start is None else start, clock=clock)
     rng = random.Random(0)  # noqa: S311 - RANDOM is no secret
-    player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, skips=True)
+    units = Units(files, keeps=False)
+    player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, units=units, skips=True)
     player.begin(0.0)
     while True:
         player.advance(now)

@@ -152,6 +152,14 @@ def print_statement(statement: Instruction) -> str:
             return f"{keyword} {listed}:"
         case "call", given:
             return f"{keyword} {statement.program}" + (f"({listed})" if given or keyword == "CALL" else "")
+        case "tasks", [task, *numbers]:
+            others = ", ".join(numbers[:2]).rstrip(", ")
+            called = " ".join(filter(None, (keyword, task, statement.program)))
+            return f"{called}({_listed(statement.operands[3:])})" + (f", {others}" if others else "")
+        case "device", _:
+            inside = STATEMENTS[keyword].inside
+            unit, others = _listed(statement.operands[:inside]).rstrip(","), _listed(statement.operands[inside:])
+            return f"{keyword} ({unit}) {others}".rstrip() if statement.operands else keyword
         case "worded", [signal] if statement.program:
             listed = f"{signal}, {statement.program}"
         case "switches", _:

@@ -13,9 +13,9 @@ from typing import Any, Final, Literal, TypeAlias
 from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
-    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "signal", "output",
-    "string", "alike", "location", "frame", "point", "any", "label", "count", "program", "variable", "array",
-    "name", "text",
+    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "task", "signal",
+    "output", "string", "alike", "location", "frame", "point", "any", "label", "count", "program", "variable",
+    "array", "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
 what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
@@ -80,16 +80,17 @@ class Form:
             rule: How an instruction's line goes on behind its keyword: what `grammar.lark` has behind this word, in
                 upper case; operands between commas, and words, if nothing is said.
             tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
-                and its name can't be a variable's), `context`, `dialect` (its first argument is that), `idle` (it's
-                recognised, but has no meaning here: 0, or an empty string); of an instruction `opens`, `closes` (a
-                structure; both: divides one), `program` (it can't stand alone), `beside` (DO may do it while a
-                program runs); of a monitor command what `monitor/commands.py` says.
+                and its name can't be a variable's), `context`, `dialect` (its first argument is that); of an
+                instruction `opens`, `closes` (a structure; both: divides one), `program` (it can't stand alone),
+                `beside` (DO may do it while a program runs); of both `reading` (no source could be read that has
+                more than the word: the form is our reading); of a monitor command what `monitor/commands.py` says.
             level: How tightly an operator binds.
         """
         operands, _, gives = spelled.partition("-> ")
-        self.name, self.help, self.origin, self.act, self.level = name, explanation, origin, act, level
+        self.name, self.help, self.act, self.level = name, explanation, act, level
         self.rule = rule or ("worded" if words else "operands")
         self.tags = frozenset(tags.split())
+        self.origin = f"{origin} †" if "reading" in self.tags else origin
         self.gives = gives
         """Of a function: a kind, or `truth`."""
         self.alike = ":alike" in operands
@@ -100,6 +101,8 @@ class Form:
         self.words = tuple(tuple(group.split("|")) for group in words.split())
         self.allowed_words = tuple(word for group in self.words for word in group)
         self.usage = usage or self._usage()
+        self.inside = self.usage.partition("(")[2].partition(")")[0].count(",") + 1
+        """Of a logical unit's instruction, how many operands are in parentheses."""
 
     def _usage(self) -> str:
         shown = ""

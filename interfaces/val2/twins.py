@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
@@ -15,6 +16,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
+from interfaces.val2.units import Units
 from robots.robot import Robot
 from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt, Status
@@ -96,6 +98,7 @@ def play(
     service: Service = Service.DATAGRAM,
     listeners: Listeners | None = None,
     limit: float = LONGEST,
+    files: Path | None = None,
     progress: Progress | None = None,
     keeper: RunKeeper | None = None,
 ) -> Played:
@@ -111,6 +114,7 @@ def play(
         service: Order of delivery on the link.
         listeners: Who hears what the program says; nobody by default.
         limit: When the program is given up [s].
+        files: The directory of the program's files; it has none unless given.
         progress: Called now and then with the user time reached [s].
         keeper: Who writes the run down while it goes on.
 
@@ -127,7 +131,7 @@ def play(
         site = SiteRobot(session.operator, operator.execute)
         val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
-        operator.player = player = Player(source, val, listeners or Listeners(), rng)
+        operator.player = player = Player(source, val, listeners or Listeners(), rng, units=Units(files))
         session.last_action = math.inf
         player.begin(0.0)
         session.lab.schedule(0.0, operator.advance)

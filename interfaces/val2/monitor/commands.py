@@ -14,6 +14,8 @@ from functools import partial
 from typing import Final, NamedTuple, TypeAlias
 
 from interfaces.val2 import forms
+from interfaces.val2.context import PROCESS_CONTROL
+from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
@@ -96,6 +98,10 @@ class MonitorCommand:
         if not (self.forms or self.more):
             nothing(rest, self.name)
         return None if self.act is None else self.act(state, rest)
+
+    def waits(self, rest: str) -> bool:
+        """Whether it can't be done while the main program runs; what is about another task can."""
+        return self.idle and not ("task" in self.forms and re.match(r"0*[1-9]", rest))
 
     def only_shows(self, rest: str) -> bool:
         """Whether it changes nothing, with what follows its name."""
@@ -345,7 +351,7 @@ _KINDS: Final = (
 )  # fmt: skip
 """Of which there are some commands each: last letter, what they are about, a form, and what completes it."""
 _TABLE: Final = (
-    MonitorCommand("ABORT", running.abort, "",
+    MonitorCommand("ABORT", running.abort, "| task",
                    "Stop the program and the arm, within its limits; Ctrl-C does the same.", short="A"),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
@@ -361,12 +367,13 @@ _TABLE: Final = (
                    completes=_SWITCHES),
     MonitorCommand("DO", running.do, "instruction |", "Carry out one instruction; without one, the last again.",
                    completes=_statement, idle=True, short="D"),
-    MonitorCommand("DONE", lambda s, _: s.controller.finish(), "", "End the program with its present cycle."),
+    MonitorCommand("DONE", partial(running.of_task, do=Controller.finish), "| task",
+                   "End the program, or a task, with its present cycle."),
     MonitorCommand("EDIT", edit, "program[,step]", "Edit a program line by line; ? there says how.",
                    completes=_programs, idle=True),
     MonitorCommand("ENABLE", partial(running.turn, on=True), "switch,..",
                    "Turn switches on; ENABLE POWER after PANIC.", completes=_SWITCHES),
-    MonitorCommand("EXECUTE", running.execute, "program[(arguments)][,cycles[,step]] |",
+    MonitorCommand("EXECUTE", running.execute, "[task] program[(arguments)][,cycles[,step]] |",
                    "Run a program, or the last; cycles -1 for ever.", completes=_programs, idle=True,
                    short="E EX"),
     MonitorCommand("EXIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
@@ -382,7 +389,7 @@ _TABLE: Final = (
                    completes=_until("=:", _LOCATIONS, _operands)),
     MonitorCommand("ID", lambda s, _: s.say(s.version), "", "Show what this is, and its version.", _LOOK),
     MonitorCommand("IO", running.io, "", "Show inputs, outputs and internal signals.", _LOOK),
-    MonitorCommand("KILL", lambda s, _: s.controller.kill(now=s.now), "",
+    MonitorCommand("KILL", partial(running.of_task, do=Controller.kill), "| task",
                    "Give up a program that stands: it can't go on any more.", idle=True),
     MonitorCommand("LISTF", storage.flist, "", "List the files.", _LOOK, more=True),
     MonitorCommand("LISTL", partial(storage.list_values, kind="locations"), "| location,..",
@@ -401,13 +408,22 @@ _TABLE: Final = (
     MonitorCommand("POINT", locations.point, "location[=expression]",
                    "Define or change a location; then CR, or changes: ,,10",
                    completes=_until("=:", _LOCATIONS, _operands)),
-    MonitorCommand("PROCEED", lambda s, _: s.controller.proceed(now=s.now), "",
+    *(MonitorCommand(f"PC{name}", partial(running.of_task, do=do, usual=PROCESS_CONTROL), "| task", said)
+      for name, do, said in (
+          ("ABORT", Controller.abort, "Stop a process control program."),
+          ("END", Controller.finish, "End a process control program with its present cycle."),
+          ("PROCEED", Controller.proceed, "Go on with a process control program that stands, at its next step."),
+          ("RETRY", Controller.retry, "Go on with a process control program at the step that was interrupted."))),
+    MonitorCommand("PCEXECUTE", partial(running.execute, usual=PROCESS_CONTROL),
+                   "[task] program[(arguments)][,cycles[,step]]",
+                   "Run a process control program beside the main one; cycles -1 for ever.", completes=_programs),
+    MonitorCommand("PROCEED", partial(running.of_task, do=Controller.proceed), "| task",
                    "Go on with a program that stands, at its next step.", idle=True, short="P"),
     MonitorCommand("QUIT", None, "", "Leave the monitor.", _LOOK, more=True, ours=True),
     MonitorCommand("RENAME", partial(storage.put, keep=False), "new=old", "Rename a program.", completes=_programs,
                    idle=True),
     MonitorCommand("RESET", lambda s, _: s.controller.signals.reset(), "", "Turn all outputs off."),
-    MonitorCommand("RETRY", lambda s, _: s.controller.retry(now=s.now), "",
+    MonitorCommand("RETRY", partial(running.of_task, do=Controller.retry), "| task",
                    "Go on with a program that stands, at the step that was interrupted.", idle=True),
     MonitorCommand("REWIND", locations.rewind, "t | -t", "Show what WHERE showed at a time, or so long ago [s].",
                    _LOOK, _operands, ours=True),

@@ -103,7 +103,7 @@ class SharedController:
             if self.control.held:
                 return "another terminal is in control"
             if self._runs:
-                self.controller.abort(now=now)
+                self.controller.abort_all(now=now)
                 self._tell(now)
             self.holder = None
         answer = self.control.request(session, now=now)
@@ -113,7 +113,7 @@ class SharedController:
 
     @property
     def _runs(self) -> bool:
-        return self.controller.running or self.controller.doing
+        return self.controller.busy or self.controller.doing
 
     def _notice(self, now: float) -> None:
         """End what runs if control has ended since this was called last, though it may be there again.
@@ -132,7 +132,7 @@ class SharedController:
         if self.holder is terminal:
             self.holder = None
             if self._runs:
-                self.controller.abort(now=now)
+                self.controller.abort_all(now=now)
             self.control.release()
 
     def advance(self, *, now: float) -> None:

@@ -164,7 +164,7 @@ class TerminalMonitor:
         if not (self._queues_commands and self._in_control and self.state.controller.running):
             return True
         command = commands.command_named(split_word(text)[0])
-        return not text.strip() or (command is not None and not command.idle)
+        return not text.strip() or (command is not None and not command.waits(split_word(text)[1]))
 
     def _take(self, text: str) -> None:
         """Do what a line says."""
@@ -212,7 +212,7 @@ class TerminalMonitor:
                 return
             if isinstance(answer, str):
                 raise ValError("No control", f"{command.name}: {answer}")
-        if command.idle and self.state.controller.running and command.name != "DO":
+        if command.waits(rest) and self.state.controller.running and command.name != "DO":
             raise ValError("Program running", f"{command.name} must wait, or ABORT it")
         if (dialogue := command.carry_out(self.state, rest)) is not None:
             self._ask(dialogue, None)
@@ -264,16 +264,21 @@ class TerminalMonitor:
                 state.output.append(OutputText(text, Style.TYPED))
             case context.Asked(text):
                 self._prompted = text
-            case context.ProgramPaused(program, step, word):
+            case context.ProgramPaused(program, step, word, 0):
                 self._prompted = None
                 if word != "XSTEP" or not state.steps:
                     state.say(f"{program} stands before step {step} ({word})", style=Style.NOTE)
+            case context.ProgramPaused(program, step, word, task):
+                state.say(f"{program}, task {task}, stands before step {step} ({word})", style=Style.NOTE)
+            case context.ProgramEnded(program, word, task) if task:
+                state.say(f"{program}, task {task}, has ended ({word})", style=Style.NOTE)
             case context.ProgramEnded(program, word):
                 self._prompted, state.steps = None, 0
                 if program or word == "ABORT":
                     state.say(f"{program or 'DO'} has ended ({word})", style=Style.NOTE)
-            case context.ProgramFailed(error):
-                self._prompted, state.steps = None, 0
+            case context.ProgramFailed(error, task):
+                if task == 0:
+                    self._prompted, state.steps = None, 0
                 state.fail(error)
             case context.Warned(text):
                 state.say(f"*Warning* {text}", style=Style.NOTE)

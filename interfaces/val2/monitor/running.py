@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -23,6 +23,8 @@ POWER: Final = "POWER"
 """The switch without which the arm doesn't move."""
 _IN_A_LINE: Final = 32
 """Signals of a line of IO."""
+_TASK: Final = re.compile(r"(\d{1,3})\s*:?\s+(?=[A-Za-z])")
+"""The number before a program's name."""
 _AT: Final = re.compile(r"(.*?)\s+DO\s+(.*)", re.DOTALL | re.IGNORECASE)
 
 
@@ -54,10 +56,17 @@ def at(state: TerminalState, rest: str) -> None:
         _carry_out(state, step)
 
 
-def execute(state: TerminalState, rest: str) -> None:
-    """EXECUTE program(arguments), cycles, step."""
-    name, arguments, cycles, step = _program(state, rest)
-    state.controller.execute(name, arguments, cycles=cycles, step=step, now=state.now)
+def execute(state: TerminalState, rest: str, *, usual: int = 0) -> None:
+    """EXECUTE task program(arguments), cycles, step; PCEXECUTE."""
+    given = _TASK.match(rest)
+    number = usual if given is None else state.controller.task_number(int(given[1]))
+    name, arguments, cycles, step = _program(state, rest if given is None else rest[given.end() :])
+    state.controller.execute(name, arguments, cycles=cycles, step=step, number=number, now=state.now)
+
+
+def of_task(state: TerminalState, rest: str, *, do: Callable[..., None], usual: int = 0) -> None:
+    """PROCEED, RETRY, KILL, DONE, and their like of process control: of the task that's given, or the usual one."""
+    do(state.controller, state.controller.task_number(integer(rest, usual, "a task")), now=state.now)
 
 
 def xstep(state: TerminalState, rest: str) -> None:
@@ -106,8 +115,11 @@ def _program(state: TerminalState, rest: str) -> tuple[str, tuple[Expression, ..
     return name, arguments, cycles, step
 
 
-def abort(state: TerminalState, _rest: str) -> None:
-    """ABORT."""
+def abort(state: TerminalState, rest: str) -> None:
+    """ABORT; ABORT task."""
+    if rest:
+        of_task(state, rest, do=type(state.controller).abort)
+        return
     controller, stands = state.controller, False
     # Refusals are reported elsewhere.
     with contextlib.suppress(ValError):
@@ -160,6 +172,10 @@ def status(state: TerminalState, _rest: str) -> None:
     )  # fmt: skip
     for depth, (name, step) in enumerate(reversed(current.stack[:-1]), 1):
         state.say(f"{'':{2 * depth}}called from {name}, step {step}")
+    for number in sorted(n for n in controller.tasks if n):
+        task = controller.status(number)
+        why = f" ({task.word})" if task.word else ""
+        state.say(f"Task {number}: {task.program}, step {task.step}: {task.state.name.lower()}{why}")
 
 
 def turn(state: TerminalState, rest: str, *, on: bool) -> None:

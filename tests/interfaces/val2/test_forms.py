@@ -13,7 +13,7 @@ from interfaces.val2.functions import OPERATORS
 from interfaces.val2.parser import parse_expression, parse_line
 
 REFERENCE = (Path(__file__).parents[3] / "docs" / "val2.md").read_text()
-ROWS = [*forms.INSTRUCTIONS.values(), *(row for row in forms.FUNCTIONS.values() if "idle" not in row.tags)]
+ROWS = [*forms.INSTRUCTIONS.values(), *forms.FUNCTIONS.values()]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.usage)
@@ -34,7 +34,7 @@ def test_the_reference_has_switches_parameters_and_what_is_passed_over():
         assert (
             f"| `{one.name}` | {one.default:g} {one.unit} | {one.low:g} to {one.high:g} {one.unit} |" in REFERENCE
         )
-    for word in (*forms.IGNORED, *(row.name for row in forms.FUNCTIONS.values() if "idle" in row.tags)):
+    for word in forms.IGNORED:
         assert f"`{word}`" in REFERENCE
 
 
@@ -55,8 +55,7 @@ def test_no_word_is_two_things():
 
 
 def test_functions_that_are_listed_are_those_that_are_made():
-    others = {row.name for row in forms.FUNCTIONS.values() if row.act is None}
-    assert others == {*expressions.OF_NAMES, *(row.name for row in forms.FUNCTIONS.values() if "idle" in row.tags)}
+    assert {row.name for row in forms.FUNCTIONS.values() if row.act is None} == expressions.OF_NAMES.keys()
     assert not any(row.act is None for row in forms.INSTRUCTIONS.values())
 
 

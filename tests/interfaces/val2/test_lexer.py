@@ -44,7 +44,7 @@ def test_what_words_are():
     assert shown("speed = 3")[0] == (Name.Variable, "speed")
     assert shown("value[1] = 3")[0] == (Name.Variable, "value")
     assert shown(" .program a")[0][0] is Keyword.Declaration
-    assert shown("ATTACH 3")[0] == (Keyword.Pseudo, "ATTACH")
+    assert shown("WINDOW 3")[0] == (Keyword.Pseudo, "WINDOW")
     assert shown("ENABLE CP") == [(Keyword, "ENABLE"), (Name.Attribute, "CP")]
     assert shown("REMARK isn't \"so") == [(Comment.Single, "REMARK isn't \"so")]
     assert shown('TYPE "a')[-1] == (Error, '"a')

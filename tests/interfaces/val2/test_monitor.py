@@ -348,4 +348,5 @@ def test_done_ends_a_program_with_its_present_cycle(sitting, cycles):
     sitting.line("DONE")
     assert sitting.finish() == "turn\nturn has ended (END)\n"
     assert sitting.type("DONE") == "*No program running*\n"
-    assert sitting.type("DONE 3").startswith("*Invalid argument*")
+    assert sitting.type("DONE 3") == "*No program running* task 3\n"
+    assert sitting.type("DONE x").startswith("*Invalid argument*")

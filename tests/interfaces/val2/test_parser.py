@@ -194,7 +194,7 @@ def test_heads_ends_and_line_ends(ends, head, last):
 
 
 def test_what_has_no_meaning_is_kept_as_it_is_written():
-    assert statement('ATTACH (lun, 4) "SERIAL:1" ;x') == Instruction("ATTACH", passed='(lun, 4) "SERIAL:1"')
+    assert statement('FCMND (lun, 4) "SERIAL:1" ;x') == Instruction("FCMND", passed='(lun, 4) "SERIAL:1"')
     assert statement("weave 3,1") == Instruction("WEAVE", passed="3,1")
     assert statement("PARAMETER not.ours = 3") == Instruction("PARAMETER", passed="not.ours = 3")
     assert all(statement(keyword).passed is not None for keyword in forms.IGNORED)
@@ -225,7 +225,11 @@ def test_words_are_keywords_only_where_they_can_stand():
         ("10 x == 3", 6, "'==' compares, '=' assigns"),
         ("x = sine(3)", 5, "*Undefined function* SINE; did you mean SIN?"),
         ("x = TRANS(1,2,3,4,5,6,7)", 5, "*Too many arguments* TRANS"),
-        ("BITS 1, 2", 10, "unexpected the end of the line; allowed: ':', '='; form: BITS first[, count] = value"),
+        (
+            "BITS 1, 2",
+            10,
+            "unexpected the end of the line; allowed: ',', ':', '='; form: BITS first[, count] = value",
+        ),
         ("SET p = SCALE(a)", 9, "*Missing argument* SCALE: SCALE(a BY factor)"),
         ("SET p = INVERSE(a BY 2)", 19, "BY belongs in SHIFT and SCALE"),
         ("SET tool = NULL", 5, "*Reserved name* TOOL is a function"),

@@ -53,9 +53,9 @@ def test_abort_while_it_asks() -> None:
 
 def test_what_has_no_meaning_is_a_warning_once() -> None:
     rig = Rig()
-    rig.run(body("FOR i = 1 TO 3", "ATTACH (1)", "END", "TYPE 1"))
+    rig.run(body("FOR i = 1 TO 3", "SELECT ROBOT = 1", "END", "TYPE 1"))
     (warning,) = (e for _, e in rig.when(Warned))
-    assert warning == Warned("ATTACH has no meaning here: program main, step 2")
+    assert warning == Warned("SELECT has no meaning here: program main, step 2")
 
 
 def test_cycles() -> None:

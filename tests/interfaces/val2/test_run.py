@@ -209,9 +209,9 @@ def test_speeds_that_count_as_less_are_said_once():
     ]  # fmt: skip
 
 
-def test_a_task_that_cant_be_started_ends_the_run(tmp_path):
-    path = tmp_path / "tasks.v2"
-    path.write_text(program("TYPE 1", "EXECUTE 1 bg", "TYPE 2") + program("SIGNAL 1", name="bg"))
+def test_what_isnt_available_ends_the_run(tmp_path):
+    path = tmp_path / "weave.v2"
+    path.write_text(program("TYPE 1", "WEAVE 3, 1", "TYPE 2"))
     assert vrs("check", path, "--static") == 2
     assert vrs("run", path, "--out", tmp_path / "out") != 0
     played, typed, _ = twins(path.read_text())

@@ -120,7 +120,7 @@ def test_the_programs_compile(path: Path) -> None:
     assert [one for one in check_text(path.read_bytes().decode(), path.name)[1] if one.severity == "error"] == []
 
 
-@pytest.mark.parametrize("stem", ["motions", "functions", "files"])
+@pytest.mark.parametrize("stem", ["motions", "functions", "files", "tasks", "angles"])
 def test_programs_that_are_there_for_their_words_run(stem: str) -> None:
     text = (HERE / "programs" / f"{stem}.v2").read_text()
     assert rehearse(parse_file(text, stem), puma560.model()).findings == ()
@@ -196,8 +196,7 @@ def wrong_uses(kind: str, row: Form) -> Iterator[str]:
         target = TARGETS[row.gives]
         if not row.repeats:
             yield f"{target} = {row.name}({many})"
-        if "idle" not in row.tags:
-            yield from (f"{target} = {other}" for other in others if other != right)
+        yield from (f"{target} = {other}" for other in others if other != right)
         return
     if row.rule not in LENIENT:
         yield f"{row.name} )"

@@ -1,0 +1,189 @@
+"""Logical units of V+: files of one directory, and the terminal, by numbers.
+
+A file is read whole when it's opened, and written whole when it's closed. What can't be done is no error of the
+program: it goes on, and IOSTAT says why. Serial lines, networks and pendants aren't here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from interfaces.system import write_whole
+
+TERMINAL: Final = 4
+DISKS: Final = (5, 6, 7, 8, 17, 18, 19)
+"""Units of files."""
+OURS: Final = 4
+"""Bit of ATTACH's mode: the unit's number is given back."""
+DONE: Final = 1.0
+EXISTS, NOT_THERE, ENDED, NOT_READY = -500.0, -501.0, -504.0, -508.0
+NOT_OPEN, NOT_ATTACHED, NOT_VALID = -513.0, -516.0, -517.0
+MESSAGES: Final = {
+    EXISTS: "*File already exists*", NOT_THERE: "*Nonexistent file*", ENDED: "*Unexpected end of file*",
+    NOT_READY: "*Device not ready*", NOT_OPEN: "*File not opened*", NOT_ATTACHED: "*Not attached to logical unit*",
+    NOT_VALID: "*Invalid file specification*",
+}  # fmt: skip
+"""What IOSTAT gives where something couldn't be done, and $ERROR of it."""
+LARGEST: Final = 4_000_000
+"""Longest file [characters]."""
+_NAME: Final = re.compile(r"(?:[A-Za-z]+:)?\\?([A-Za-z0-9_][A-Za-z0-9_.-]{0,99})")
+
+
+@dataclass(slots=True)
+class _Unit:
+    """A unit that is attached."""
+
+    path: Path | None = None
+    """Of the file that is open."""
+    text: str = ""
+    place: int = 0
+    """Up to where it's read [characters]."""
+    writes: bool = False
+
+
+class Units:
+    """The units of a controller."""
+
+    def __init__(
+        self, directory: Path | None = None, *, keeps: bool = True, warn: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Attach nothing yet.
+
+        Args:
+            directory: Whose files programs may read and write; None for none at all.
+            keeps: Whether what is written gets there; else it's only remembered.
+            warn: Is told what isn't here.
+        """
+        self.directory, self._keeps, self.warn = directory, keeps, warn
+        self._units: dict[int, _Unit] = {}
+        self._status: dict[int, float] = {}
+        self._written: dict[Path, str | None] = {}
+        """Files as they'd be; None for deleted."""
+
+    def attach(self, unit: int | None, device: str) -> int:
+        """ATTACH a unit, or the first that's free for None; its number, 0 where none is."""
+        disk = device.upper().rstrip(":") in ("", "DISK", "SYSTEM", "A", "C", "D")
+        if not disk or (unit is not None and unit not in (TERMINAL, *DISKS)):
+            self.warn(f"ATTACH {device or unit}: only files and the terminal are here, no serial line or pendant")
+            self._status[unit or 0] = NOT_READY
+            return unit or 0
+        free = [number for number in DISKS if number not in self._units]
+        number = unit if unit is not None else free[0] if free else 0
+        if number != TERMINAL and self.directory is None:
+            self.warn("ATTACH of files: no directory is given; --files DIR says where programs read and write")
+            self._status[number] = NOT_READY
+        elif number:
+            self._units.setdefault(number, _Unit())
+            self._status[number] = DONE
+        return number
+
+    def detach(self, unit: int) -> None:
+        """DETACH: close what is open, too."""
+        if unit in self._units and self._units[unit].path is not None:
+            self.close(unit)
+        self._status[unit] = DONE if self._units.pop(unit, None) is not None else NOT_ATTACHED
+
+    def open(self, keyword: str, unit: int, name: str) -> None:
+        """FOPENR, FOPENW, FOPENA: a file to read, a new one, or one to add to."""
+        self._status[unit] = self._opened(keyword, unit, name)
+
+    def _opened(self, keyword: str, unit: int, name: str) -> float:
+        known, path = self._units.get(unit), self._path(name)
+        if known is None or path is None:
+            return NOT_ATTACHED if known is None else NOT_VALID
+        text = self._read(path)
+        if keyword == "FOPENW" and text is not None:
+            return EXISTS
+        if keyword == "FOPENR" and text is None:
+            return NOT_THERE
+        writes = keyword != "FOPENR"
+        self._units[unit] = _Unit(path, text or "", len(text or "") if writes else 0, writes)
+        return DONE
+
+    def _path(self, name: str) -> Path | None:
+        found = _NAME.fullmatch(name.strip())
+        return None if found is None or self.directory is None else self.directory / found[1]
+
+    def _read(self, path: Path) -> str | None:
+        """The text of a file; None where there's none, or none that can be read."""
+        if path in self._written:
+            return self._written[path]
+        try:
+            if path.resolve().parent != path.parent.resolve() or path.stat().st_size > LARGEST:
+                return None
+            return path.read_text("utf-8", errors="replace").replace("\r\n", "\n")
+        except OSError:
+            return None
+
+    def close(self, unit: int) -> None:
+        """FCLOSE."""
+        known = self._units.get(unit)
+        if known is None or known.path is None:
+            self._status[unit] = NOT_OPEN
+            return
+        self._status[unit] = self._write(known.path, known.text) if known.writes else DONE
+        self._units[unit] = _Unit()
+
+    def delete(self, unit: int, name: str) -> None:
+        """FDELETE a file."""
+        path = self._path(name)
+        if unit not in self._units or path is None:
+            self._status[unit] = NOT_ATTACHED if path is not None else NOT_VALID
+        else:
+            self._status[unit] = NOT_THERE if self._read(path) is None else self._write(path, None)
+
+    def _write(self, path: Path, text: str | None) -> float:
+        try:
+            if not self._keeps:
+                self._written[path] = text
+            elif text is None:
+                path.unlink()
+            else:
+                write_whole(path, text.encode())
+        except OSError:
+            return NOT_READY
+        return DONE
+
+    def read(self, unit: int) -> str | None:
+        """READ: the next line of a file; None where there's none."""
+        known = self._units.get(unit)
+        if known is None or known.path is None or known.place >= len(known.text):
+            self._status[unit] = ENDED if known is not None and known.path is not None else NOT_OPEN
+            return None
+        line, _, _ = known.text[known.place :].partition("\n")
+        known.place += len(line) + 1
+        self._status[unit] = DONE
+        return line
+
+    def refuse(self, unit: int) -> None:
+        """A line that was read isn't what was wanted."""
+        self._status[unit] = NOT_VALID
+
+    def character(self, unit: int) -> float:
+        """GETC: the code of the next character, or why there's none."""
+        known = self._units.get(unit)
+        if known is None or known.path is None:
+            return NOT_OPEN
+        if known.place >= len(known.text):
+            return ENDED
+        known.place += 1
+        return float(ord(known.text[known.place - 1]))
+
+    def write(self, unit: int, text: str) -> None:
+        """WRITE: add to a file."""
+        known = self._units.get(unit)
+        if known is None or known.path is None or not known.writes:
+            self._status[unit] = NOT_OPEN
+        elif len(known.text) + len(text) > LARGEST:
+            self._status[unit] = NOT_READY
+        else:
+            known.text += text
+            self._status[unit] = DONE
+
+    def status(self, unit: float) -> float:
+        """IOSTAT: 1 where the last that was wanted of a unit is done, else why it isn't."""
+        return self._status.get(int(unit), NOT_ATTACHED)

@@ -1,0 +1,97 @@
+"""Files of programs: one directory, and what IOSTAT says of the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from interfaces.val2.playing import Listeners, rehearse
+from interfaces.val2.source import parse_file
+from interfaces.val2.units import Units
+from robots import puma560
+from tests.interfaces.val2.test_check import exit_code
+from tests.interfaces.val2.test_tasks import programs
+
+PROGRAM = (Path(__file__).parent / "programs" / "files.v2").read_text()
+
+
+def typed(text: str, files: Path | None) -> tuple[list[str], list[str]]:
+    """What a program types and of what it's warned, in a rehearsal."""
+    said: list[str] = []
+    warned: list[str] = []
+    found = rehearse(
+        parse_file(text, "t.v2"), puma560.model(), listeners=Listeners(said.append, warned.append), files=files
+    )
+    assert found.findings == ()
+    return said, warned
+
+
+def test_a_program_writes_a_file_and_reads_it_again(tmp_path: Path) -> None:
+    said, warned = typed(PROGRAM, tmp_path)
+    assert said == [
+        "*Device not ready*\n",
+        "part  7 3 4.5 -504\n",
+        " -7 2.5\n",
+        "done\n",
+    ]
+    assert warned == ["ATTACH SERIAL:1: only files and the terminal are here, no serial line or pendant"]
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_without_a_directory_that_is_said_in_one_line() -> None:
+    said, warned = typed(PROGRAM, None)
+    assert said[1] == "*Not attached to logical unit*\n"
+    assert warned[1:] == ["ATTACH of files: no directory is given; --files DIR says where programs read and write"]
+
+
+def test_a_run_keeps_what_was_written_and_a_check_does_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files, path = tmp_path / "files", tmp_path / "t.v2"
+    files.mkdir()
+    path.write_text(
+        programs(main='ATTACH (5) "DISK"; FOPENW (5) "a.txt"; WRITE (5) "x", /S; WRITE (5) 2; FCLOSE (5)')
+    )
+    assert exit_code("check", str(path), "--files", str(files)) == 0
+    assert [*files.iterdir()] == []
+    assert exit_code("run", str(path), "--files", str(files), "--out", str(tmp_path / "out")) == 0
+    assert (files / "a.txt").read_text() == "x 2\n"
+    assert exit_code("run", str(path), "--files", str(path)) == 2
+    assert "files" in capsys.readouterr().err
+
+
+def test_iostat_says_why_something_couldnt_be_done(tmp_path: Path) -> None:
+    (tmp_path / "there.txt").write_text("one\r\n2 3\n")
+    (tmp_path.parent / "outside.txt").write_text("secret\n")
+    (tmp_path / "link.txt").symlink_to(tmp_path.parent / "outside.txt")
+    units = Units(tmp_path)
+    assert units.attach(None, "DISK") == 5
+    for keyword, name, status in (
+        ("FOPENR", "nowhere.txt", -501), ("FOPENW", "there.txt", -500), ("FOPENR", "../outside.txt", -517),
+        ("FOPENR", "link.txt", -501), ("FOPENR", "there.txt", 1),
+    ):  # fmt: skip
+        units.open(keyword, 5, name)
+        assert units.status(5) == status, name
+    assert (units.read(5), units.read(5), units.read(5)) == ("one", "2 3", None)
+    assert units.status(5) == -504
+    units.write(5, "x")
+    assert units.status(5) == -513
+    units.detach(5)
+    units.open("FOPENR", 5, "there.txt")
+    assert units.status(5) == -516
+    assert units.status(6) == -516
+
+
+def test_a_line_that_isnt_what_was_wanted_leaves_variables_alone(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("word\n")
+    steps = 'x = 7; ATTACH (lun, 4) "DISK"; FOPENR (lun) "a.txt"; READ (lun) x; TYPE x, IOSTAT(lun)'
+    assert typed(programs(main=steps), tmp_path)[0] == [" 7 -517\n"]
+
+
+def test_the_terminal_is_unit_4() -> None:
+    said: list[str] = []
+    listeners = Listeners(said.append, asked=lambda question: "5, Ada")
+    text = programs(main="READ (4) n, $name; WRITE (4) $name, n")
+    assert rehearse(parse_file(text, "t.v2"), puma560.model(), listeners=listeners).findings == ()
+    assert said == ["Ada 5\n"]
