@@ -159,6 +159,7 @@ class Routine:
 
 COMMENT = re.compile(r'^((?:[^";]|"[^"]*")*);.*$')
 HEAD = re.compile(r"\.PROGRAM\s+([\w.]+)\s*(?:\((.*)\))?", re.IGNORECASE)
+ASSIGNED = re.compile(r"[#$]?[A-Za-z][\w.]*(\[[^=]*\])?\s*=(?!=)")
 PARTS = re.compile(r"\s*(\d+(?![\w.]))?\s*(.*?)\s*$")
 INPUT = re.compile(r"\s*(\d+)\s*=\s*(.*?)(?:\s+(AFTER|FOR|AT)\s+([\d.]+))?\s*$", re.IGNORECASE)
 
@@ -167,6 +168,11 @@ def word_of(text: str) -> str:
     """The word that a line begins with, upper case."""
     found = re.match(r"[A-Za-z][\w.]*", text)
     return found[0].upper() if found else ""
+
+
+def assigns(text: str) -> bool:
+    """Whether a line is a variable, =, and a value."""
+    return ASSIGNED.match(text) is not None and word_of(text) not in {"PARAMETER", "TIMER", "BITS"}
 
 
 class Text:
@@ -217,12 +223,7 @@ class Text:
     def _step(self, n: int, line: str) -> None:
         label, text = PARTS.match(line).groups()  # type: ignore[union-attr]
         step, word = Step(n, label or "", text), word_of(text)
-        assigned = re.match(r"[\w.]+(\[[^]]*\])?\s*=(?!=)", text) and word not in {
-            "PARAMETER",
-            "TIMER",
-            "BITS",
-            "FOR",
-        }
+        assigned = assigns(text)
         opens = not assigned and (
             word in {"WHILE", "FOR", "CASE"} or text.upper() == "DO"
             or (word == "IF" and not re.search(r"\bGOTO\s+\d+$|\bTHEN\s+\d+$", text, re.IGNORECASE))
@@ -362,7 +363,7 @@ MATHS: dict[str, Callable[..., Any]] = {
     "#PPOINT": lambda *q: tuple(x or 0.0 for x in q), "PPOINT": lambda *q: tuple(x or 0.0 for x in q),
     "PI": lambda: math.pi,
     "TRUE": lambda: -1, "ON": lambda: -1, "FALSE": lambda: 0, "OFF": lambda: 0, "NULL": SE3, "TIMER": lambda _: 0.0,
-    "INRANGE": lambda _: 0, "IOSTAT": lambda *_: 0, "LEN": len, "VAL": float, "ASC": ord, "$CHR": chr,
+    "INRANGE": lambda _: 0, "IOSTAT": lambda *_: 0,
 }  # fmt: skip
 ARITHMETIC: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b, ast.Sub: lambda a, b: a - b, ast.Mult: lambda a, b: a * b,
@@ -450,11 +451,7 @@ class Evaluation:
         rest = text[len(word) :].strip()
         if step.blocks:
             self._structure(step)
-        elif re.match(r"[#$]?[A-Za-z][\w.]*(\[[^=]*\])?\s*=(?!=)", text) and word not in {
-            "PARAMETER",
-            "TIMER",
-            "BITS",
-        }:
+        elif assigns(text):
             self._assign(*text.split("=", 1))
         elif word in MOTIONS:
             self._motion(step, word, rest)

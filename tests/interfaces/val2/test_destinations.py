@@ -35,7 +35,7 @@ LAST = {
     "01_depalletizing": (96, "24 parts\n"),
     "02_machine_tending": (27, "3 parts are turned\n"),
     "03_peg_in_hole": (7, "in at  13.5 mm\n"),
-    "04_moved_fixture": (18, "grip 3 off by  0.000 mm\n"),
+    "04_moved_fixture": (21, "from there off by  0.000 mm\n"),
     "05_belt_places": (31, "the stack is 125.0 mm high\n"),
     "06_welding_seam": (18, "4 stitches on 229.1 mm\n"),
     "07_spiral_search": (26, "place 11: -4.86  4.86 mm off\n"),
@@ -109,6 +109,7 @@ FAULTS = {
         "end.point 100 530.02 -60 90 50 0",
     ),
     "a tool's turn": ("10_tool_change", "RY(15)", "RY(15.011)"),
+    "a base's sign": ("04_moved_fixture", "BASE 40,-20,15,5", "BASE -40,20,-15,-5"),
     "one round less": ("09_sorting", "part = 1 TO 9", "part = 1 TO 8"),
     "by value": ("09_sorting", "count = count+1", "AUTO count\ncount = 1"),
 }
