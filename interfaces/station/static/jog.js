@@ -136,6 +136,7 @@ export function mount(station, box) {
     });
   }, 100);
 
+  station.addEventListener("cursor", () => box.toggleAttribute("data-blind", steer.blind));
   station.on("welcome", build);
   if (session.welcome) build();
 }

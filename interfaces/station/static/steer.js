@@ -19,6 +19,12 @@ export class Steer {
     station.addEventListener("stopping", () => this.releaseAll({ silently: true }));
     station.on("lease", () => this.session.holds || this.releaseAll());
     station.on("link", (link) => link === "live" || this.releaseAll());
+    station.addEventListener("cursor", () => this.blind && this.releaseAll());
+  }
+
+  /** Whether the picture shows another time than now: nobody steers by that. */
+  get blind() {
+    return (this.station.shared.pane?.cursor ?? null) !== null;
   }
 
   get active() {
@@ -36,6 +42,11 @@ export class Steer {
     const session = this.session;
     if (!session.holds || session.link !== "live") {
       session.order({ type: "steer" });
+      released();
+      return false;
+    }
+    if (this.blind) {
+      this.station.refuse("you look at another time: press Live to steer");
       released();
       return false;
     }

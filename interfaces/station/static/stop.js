@@ -27,6 +27,18 @@ export function mount(station, box) {
     if (!lasting) fading = setTimeout(() => write(note, ""), SHOWN);
   }
 
+  /** Who has control and can't be stopped from here; null where nobody is, or it can. */
+  function another() {
+    const { lease, link, welcome } = session;
+    const may = link !== "live" || lease.yours || lease.state !== "held" || welcome?.role === "admin";
+    return may ? null : lease.holder;
+  }
+
+  /** STOP is there where it works: nobody should rely on one that doesn't. */
+  function show() {
+    button.hidden = another() !== null;
+  }
+
   function waits() {
     const since = Number(sessionStorage.getItem(KEY) ?? NaN);
     return Date.now() - since < 1000 * WAITS;
@@ -49,9 +61,8 @@ export function mount(station, box) {
     } else if (session.welcome?.role === "admin" && session.lease.state === "held") {
       session.wish("take-over");
       say(`STOP: taking over from ${session.lease.holder}, which stops the robot`);
-    } else if (session.lease.state === "held") {
-      say(`You can't stop the robot: ${session.lease.holder} has control`);
-    } else say("Nobody has control: the robot is at rest, or coming to rest");
+    } else if (another() !== null) say(`You can't stop the robot: ${another()} has control`);
+    else say("Nobody has control: the robot is at rest, or coming to rest");
   }
 
   /** Whoever is connected again sends what waited, once it's known who has control. */
@@ -91,6 +102,7 @@ export function mount(station, box) {
     { capture: true },
   );
   station.on("lease", catchUp);
+  for (const type of ["lease", "link", "welcome"]) station.on(type, show);
   station.on("outcome", (entry) => {
     if (entry !== mine) return;
     mine = null;
@@ -98,6 +110,7 @@ export function mount(station, box) {
     delete button.dataset.waits;
     say(entry.outcome.refusal ? `STOP refused: ${entry.outcome.refusal}` : "Stopping");
   });
+  show();
   if (waits()) catchUp();
   station.shared.stop = stop;
 }

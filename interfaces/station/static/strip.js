@@ -48,8 +48,16 @@ export function mount(station, box) {
   let listed = false;
 
   function button(id, text, symbol, action, title) {
-    return h("button.tool", { type: "button", id, title, "aria-label": text ? null : title, onclick: action },
+    const does = () => (made.dataset.bar ? station.refuse(made.dataset.bar) : action());
+    const made = h("button.tool", { type: "button", id, title, "aria-label": text ? null : title, onclick: does },
       icon(symbol), text || null);
+    return made;
+  }
+
+  /** Let a button do nothing now but say why; "" where it works. */
+  function bar(made, why) {
+    mark(made, "data-bar", why || null);
+    mark(made, "aria-disabled", why ? "true" : null);
   }
 
   function zoom(way) {
@@ -82,10 +90,13 @@ export function mount(station, box) {
   }
 
   function chosen(id) {
-    const changes = id !== null && session.holds && session.link === "live";
-    const open = changes && bars.move(id)?.end > (session.now ?? 0);
-    for (const element of [drop, via, place]) element.disabled = !open;
-    undo.disabled = !session.holds || session.link !== "live";
+    const idle = session.link !== "live" ? "there's no connection" : session.holds ? "" : "take control first";
+    const move = id === null ? null : bars.move(id);
+    const none = move ? "this move is over" : "choose a move on the strip first";
+    const why = idle || (move?.end > (session.now ?? 0) ? "" : none);
+    bar(undo, idle);
+    for (const made of [drop, via]) bar(made, why);
+    place.disabled = why !== "";
   }
 
   /** The time under a pointer becomes what is shown. */

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
+import interfaces.station
 from interfaces.station.panels import PANELS, Offer, Panel, panels_of
 from vrs.errors import InvalidValueError
 
 ARM = """pane drag link control theme stop jog receipts plots terminal network record strip hints"""
+STATIC = Path(interfaces.station.__file__).parent / "static"
 BASE = """floor link control theme stop drive map jobs camera deviation network record hints"""
 
 
@@ -24,3 +29,11 @@ def test_every_panel_can_be_had_and_its_name_is_a_files() -> None:
     assert set(panels_of(set(Offer))) == set(PANELS)
     with pytest.raises(InvalidValueError, match="small letters"):
         Panel("../x", "Elsewhere", "side")
+
+
+def test_every_symbol_that_is_named_has_an_outline() -> None:
+    outlines = set(re.findall(r"^  (\w+): \"", (STATIC / "icons.js").read_text(), re.MULTILINE))
+    scripts = "".join(path.read_text() for path in STATIC.glob("*.js"))
+    named = set(re.findall(r"""\bicon\("(\w+)"\)""", scripts)) | {panel.icon for panel in PANELS if panel.icon}
+    assert len(named) > 15
+    assert named <= outlines

@@ -261,6 +261,27 @@ def test_scheduled_moves_are_split_taken_back_and_deleted(page: Page) -> None:
     until(lambda: scheduled(page) == {})
 
 
+def test_what_the_strips_buttons_cant_do_now_they_say(page: Page) -> None:
+    notice = "document.getElementById('notice').textContent"
+
+    def says(button: str, words: str) -> None:
+        assert page.page.locator(button).get_attribute("aria-disabled") == "true"
+        page.page.locator(button).click(force=True)
+        page.wait(f"{notice}.toLowerCase().includes({words!r})")
+        page.page.keyboard.press("Escape")
+
+    says("#undo", "take control first")
+    says("#delete", "take control first")
+    page.take_control().rest()
+    says("#via", "choose a move")
+    move = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 40)
+    page.page.click("#zoom-out")
+    page.page.locator(f".move[data-id='{move}']").press("Enter")
+    page.wait("!document.getElementById('delete').ariaDisabled")
+    page.page.click("#delete")
+    until(lambda: scheduled(page) == {})
+
+
 def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     page.take_control().rest()
     rest = page.virtual
@@ -282,6 +303,12 @@ def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
     page.page.select_option("#when", "now")
     before = page.virtual
+    # Nobody steers by a picture of another time; a move that is planned is one's own business.
+    page.page.locator("button[aria-label='Joint 1 up']").click(delay=200)
+    page.wait("document.getElementById('notice').textContent.includes('press Live to steer')")
+    page.page.evaluate("document.activeElement.blur()")
+    page.page.keyboard.press("q", delay=200)
+    assert page.virtual == pytest.approx(before, abs=1e-9)
     page.page.click("[data-pose=nominal]")
     page.until(lambda: moved(page, 0.3, before))
     assert page.get("station.shared.pane.cursor") == shown
@@ -301,6 +328,9 @@ def test_a_second_one_watches_until_control_is_given(browser: Any, server: Child
         second.open()
         assert "has control" in second.page.locator("#control-pill").text_content()
         assert second.page.locator("#take").is_hidden()
+        # STOP works for who has control alone, and is there for nobody else.
+        assert second.page.locator("#stop").is_hidden()
+        assert page.page.locator("#stop").is_visible()
         second.shoot("watching")
         before = page.virtual
         second.page.evaluate("window.said = []; station.on('problem', (problem) => said.push(problem.text))")
@@ -321,7 +351,9 @@ def test_a_second_one_watches_until_control_is_given(browser: Any, server: Child
         assert page.get(HOLDS)
         page.page.click("#give")
         second.wait("!document.getElementById('take').hidden")
+        assert second.page.locator("#stop").is_visible()
         second.take_control()
+        page.wait("document.getElementById('stop').hidden")
         page.wait("document.getElementById('control-pill').textContent.includes('has control')")
         second.page.click("[data-pose=ready]" if before[1] < 1.2 else "[data-pose=nominal]")
         page.until(lambda: moved(page, 0.05, before))
