@@ -51,33 +51,43 @@ class BaseTimeline(Generic[S]):
     """An immutable run of segments, half-open and contiguous."""
 
     __slots__ = (
-        "_asked", "_count", "_first", "_near", "end", "height", "initial", "root", "start", "version",
+        "_asked", "_count", "_end", "_first", "_height", "_initial", "_near", "_root", "_start", "version",
     )  # fmt: skip
 
-    initial: Array
-    """Position before the start, read-only: joints [rad], (n,), or a posture, (3,)."""
-    start: float
-    """Origin [s]."""
-    end: float
-    """End of the last segment [s]; the origin while there's none."""
-    root: Node | None
-    """The tree that holds the segments; None while there's none."""
-    height: int
-    """Levels of nodes above the tree's leaves."""
     version: int
     """How many edits made it."""
 
     def _set(self, initial: Array, start: float, root: Node | None, height: int, version: int) -> None:
-        self.initial = initial
-        self.start = start
-        self.root = root
-        self.height = height
+        self._initial = initial
+        self._start = start
+        self._root = root
+        self._height = height
         self._count = 0 if root is None else root.count
         self._first = start if root is None else first_start(root, height, 0.0)
-        self.end = start if root is None else last_end(root, height)
+        self._end = start if root is None else last_end(root, height)
         self._asked: tuple[float, int, Path] | None = None
         self._near: tuple[int, Path] | None = None
         self.version = version
+
+    @property
+    def start(self) -> float:
+        """Origin [s]."""
+        return self._start
+
+    @property
+    def end(self) -> float:
+        """End of the last segment [s]; the origin while there's none."""
+        return self._end
+
+    @property
+    def root(self) -> Node | None:
+        """The tree that holds the segments; None while there's none."""
+        return self._root
+
+    @property
+    def height(self) -> int:
+        """Levels of nodes above the tree's leaves."""
+        return self._height
 
     @property
     def segments(self) -> SegmentView[S]:
@@ -88,23 +98,23 @@ class BaseTimeline(Generic[S]):
         return self._count
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return remade, (type(self), self.initial, self.start, self.root, self.height, self.version)
+        return remade, (type(self), self._initial, self._start, self._root, self._height, self.version)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BaseTimeline) or type(self) is not type(other):
             return False
-        head = (self.start, self.end, len(self)) == (other.start, other.end, len(other))
-        if not head or not np.array_equal(self.initial, other.initial):
+        head = (self._start, self._end, len(self)) == (other._start, other._end, len(other))
+        if not head or not np.array_equal(self._initial, other._initial):
             return False
-        if self.root is other.root:
+        if self._root is other._root:
             return True
         return all(a == b for a, b in zip(self.segments, other.segments, strict=True))
 
     def __hash__(self) -> int:
-        return hash((self.start, self.end, len(self), self.initial.tobytes()))
+        return hash((self._start, self._end, len(self), self._initial.tobytes()))
 
     def __repr__(self) -> str:
-        span = f"[{self.start:g}, {self.end:g}) s"
+        span = f"[{self._start:g}, {self._end:g}) s"
         return f"{type(self).__name__}({len(self)} segments, {span}, version {self.version})"
 
     def _way_at(self, t: float) -> tuple[int, Path]:
@@ -114,8 +124,8 @@ class BaseTimeline(Generic[S]):
         """
         newest = self._asked
         if newest is None or newest[0] != t:
-            assert self.root is not None
-            index, path = path_at(self.root, self.height, t)
+            assert self._root is not None
+            index, path = path_at(self._root, self._height, t)
             self._asked = newest = t, index, path
             self._near = index - path.place, path
         return newest[1], newest[2]
@@ -124,9 +134,9 @@ class BaseTimeline(Generic[S]):
         """The way to a segment; one more step from its neighbours in the leaf that was asked for last."""
         near = self._near
         if near is None or not 0 <= index - near[0] < near[1].leaf.count:
-            if self.root is None or not 0 <= index < self._count:
+            if self._root is None or not 0 <= index < self._count:
                 raise IndexError(index)
-            path = path_to(self.root, self.height, index)
+            path = path_to(self._root, self._height, index)
             self._near = near = index - path.place, path
         first, path = near
         return Path(path.steps, path.leaf, index - first, path.offset)
@@ -141,16 +151,16 @@ class BaseTimeline(Generic[S]):
 
     def index_at(self, t: float) -> int:
         """Index of the segment with start ≤ t < end; −1 before the first, len(self) after the last."""
-        if t >= self.end:
+        if t >= self._end:
             return self._count
-        if self.root is None or t < self._first:
+        if self._root is None or t < self._first:
             return -1
         return self._way_at(t)[0]
 
     def start_of(self, index: int) -> float:
         """Start of a segment [s]; of index len(self), the end."""
         if index >= self._count:
-            return self.end
+            return self._end
         leaf, i, offset = self._locate(index)
         return offset + leaf.starts[i]
 
@@ -161,7 +171,7 @@ class BaseTimeline(Generic[S]):
 
     def owners(self, low: int, high: int) -> tuple[int, ...]:
         """Distinct command ids of the segments low to high − 1, in order, without holds."""
-        parts = leaves(self.root, self.height, low, high)
+        parts = leaves(self._root, self._height, low, high)
         found = dict.fromkeys(owner for leaf, part, _ in parts for owner in leaf.owners[part])
         found.pop(HOLD, None)
         return tuple(found)
@@ -180,7 +190,7 @@ class BaseTimeline(Generic[S]):
 
     def with_version(self, version: int) -> Self:
         """The same timeline under another version number."""
-        return remade(type(self), self.initial, self.start, self.root, self.height, version)
+        return remade(type(self), self._initial, self._start, self._root, self._height, version)
 
     def segment(self, index: int) -> S:
         """The segment at an index, 0 to len(self) − 1."""
@@ -188,8 +198,8 @@ class BaseTimeline(Generic[S]):
 
     def _cut(self, cut: float) -> tuple[Path | None, float | None]:
         """The way to the last segment that begins before a time [s], and what it lasts if that cuts it short."""
-        if self.root is None or not self._first <= cut < self.end:
-            return (self._way_to(self._count - 1) if self._count and cut >= self.end else None), None
+        if self._root is None or not self._first <= cut < self._end:
+            return (self._way_to(self._count - 1) if self._count and cut >= self._end else None), None
         index, left = self._way_at(cut)
         last = cut - (left.offset + left.leaf.starts[left.place])
         if last > 0:
@@ -283,7 +293,12 @@ class Timeline(BaseTimeline[PolynomialSegment]):
     @property
     def dof(self) -> int:
         """Number of joints, n."""
-        return len(self.initial)
+        return len(self._initial)
+
+    @property
+    def initial(self) -> Array:
+        """Joints before the start [rad], (n,)."""
+        return self._initial
 
     def segment(self, index: int) -> PolynomialSegment:
         """The segment at an index, 0 to len(self) − 1."""
@@ -293,7 +308,7 @@ class Timeline(BaseTimeline[PolynomialSegment]):
 
     def knots(self, low: int, high: int) -> tuple[Array, Array]:
         """Starts of the segments low to high − 1 [s], (m,), and their velocities there [rad/s], (m, n)."""
-        return knots_of(leaves(self.root, self.height, low, high), self.dof)
+        return knots_of(leaves(self._root, self._height, low, high), self.dof)
 
     def sample(self, t: ArrayLike, *, derivative: int = 0) -> Array:
         """Evaluate the timeline.
@@ -327,7 +342,7 @@ class Timeline(BaseTimeline[PolynomialSegment]):
         try:
             cursor = free.pop()
         except IndexError:
-            cursor = idle_cursor(len(self.initial))
+            cursor = idle_cursor(len(self._initial))
         low, high, product, rows, powers, few, many = cursor
         if not low <= x < high:
             low, high, rows = self._find(x)
@@ -344,14 +359,14 @@ class Timeline(BaseTimeline[PolynomialSegment]):
         moments = times(t)
         if moments.ndim == 0:
             return self._at(float(moments), order)
-        if self.root is None:
-            return np.tile(np.zeros(self.dof) if order else self.initial, (len(moments), 1))
+        if self._root is None:
+            return np.tile(np.zeros(self.dof) if order else self._initial, (len(moments), 1))
         places = None if (moments[1:] >= moments[:-1]).all() else np.argsort(moments)
         if places is not None:
             moments = moments[places]
         values = np.empty((len(moments), self.dof))
-        begin, stop = moments.searchsorted((self._first, self.end)).tolist()
-        values[:begin] = 0.0 if order else self.initial
+        begin, stop = moments.searchsorted((self._first, self._end)).tolist()
+        values[:begin] = 0.0 if order else self._initial
         values[stop:] = 0.0 if order else self._last()
         if begin < stop:
             self._fill(moments[begin:stop], order, values[begin:stop])
@@ -363,7 +378,7 @@ class Timeline(BaseTimeline[PolynomialSegment]):
 
     def _fill(self, t: Array, derivative: int, out: Array) -> None:
         """Write the values at sorted times within the span into `out`, (k, n), by Horner's rule."""
-        assert self.root is not None
+        assert self._root is not None
         count, n = out.shape
         room = min(count, GATHERED)
         terms, u = np.empty((room, n, QUICK_ORDER)), np.empty(room)
@@ -373,7 +388,7 @@ class Timeline(BaseTimeline[PolynomialSegment]):
             powers = terms[: end - begin].reshape(-1, QUICK_ORDER).T
             horner(powers.__getitem__, QUICK_ORDER, u[: end - begin], derivative, out[begin:end])
 
-        for node, offset, low, high in nodes_at(self.root, self.height, 0.0, t, 0):
+        for node, offset, low, high in nodes_at(self._root, self._height, 0.0, t, 0):
             stack = stack_of(node, n, high - low)
             if stack is None:
                 for row, x in zip(out[low:high], t[low:high].tolist(), strict=True):
@@ -417,14 +432,14 @@ class Timeline(BaseTimeline[PolynomialSegment]):
                 except (IndexError, ValueError, OverflowError):
                     # Before or after all, or no finite number: what follows knows.
                     pass
-        if not self._first <= t < self.end:
+        if not self._first <= t < self._end:
             if not math.isfinite(t):
                 raise NonFiniteTimeError(t)
             if t < self._first:
-                return -_LARGEST, self._first, self.initial[None]
-            return self.end, math.inf, self._last()[None]
+                return -_LARGEST, self._first, self._initial[None]
+            return self._end, math.inf, self._last()[None]
         # No index yet; at a node's end; where rounding led astray.
-        root, height = self.root, self.height
+        root, height = self._root, self._height
         assert root is not None
         self._missed += 1
         if places is None and self._missed * _VISITS > self._count:
@@ -436,7 +451,7 @@ class Timeline(BaseTimeline[PolynomialSegment]):
     def _last(self) -> Array:
         """Position that is held after the end [rad], (n,), read-only."""
         if not self._count:
-            return self.initial
+            return self._initial
         if self._final is None:
             leaf, i, _ = self._locate(self._count - 1)
             final = power_sum(rows_of(leaf.rows[i], self.dof), leaf.durations[i])
@@ -453,10 +468,10 @@ class Timeline(BaseTimeline[PolynomialSegment]):
 
         An earlier segment of degree 2 or less that ends at rest leaves no acceleration behind.
         """
-        if self.root is None or not self._first < t <= self.end:
+        if self._root is None or not self._first < t <= self._end:
             rest = np.zeros(self.dof)
-            return State(self.initial.copy() if t <= self._first else self.final(), rest, rest)
-        if t < self.end:
+            return State(self._initial.copy() if t <= self._first else self.final(), rest, rest)
+        if t < self._end:
             index, (_, leaf, i, offset) = self._way_at(t)
             if offset + leaf.starts[i] >= t:
                 leaf, i, offset = self._locate(index - 1)
@@ -482,18 +497,18 @@ class Timeline(BaseTimeline[PolynomialSegment]):
             tail: Index, in this timeline, of the first segment that stays after the pieces; None for none.
             tail_start: Time at which the tail starts [s].
         """
-        start = self.start
+        start = self._start
         left, last = self._cut(cut)
-        if self.root is None or not self._first <= cut < self.end:
+        if self._root is None or not self._first <= cut < self._end:
             start = min(start, cut)
-            if cut > self.end:
-                pieces = (Piece([cut - self.end], [self._last()[None]], HOLD), *pieces)
-                cut = self.end
+            if cut > self._end:
+                pieces = (Piece([cut - self._end], [self._last()[None]], HOLD), *pieces)
+                cut = self._end
         right = None
         if tail is not None and tail_start is not None and tail < self._count:
             right = self._way_to(tail)
-        tree = splice(self.height, left, last, run_of(pieces, cut), right, tail_start or 0.0)
-        result = remade(Timeline, self.initial, start, *tree, self.version + 1)
+        tree = splice(self._height, left, last, run_of(pieces, cut), right, tail_start or 0.0)
+        result = remade(Timeline, self._initial, start, *tree, self.version + 1)
         try:
             cursor = self._free.pop()
         except IndexError:

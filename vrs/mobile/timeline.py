@@ -77,6 +77,11 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
         self._final: _Posture | None = None
         self._found: tuple[float, float, tuple[float, ...]] = math.inf, -math.inf, ()
 
+    @property
+    def initial(self) -> Array:
+        """Posture before the start, (3,)."""
+        return self._initial
+
     def segment(self, index: int) -> ArcSegment:
         """The arc at an index, 0 to len(self) − 1."""
         leaf, i, offset = self._locate(index)
@@ -110,7 +115,7 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
 
     def speeds_before(self, t: float) -> tuple[float, float]:
         """V and ω [m/s, rad/s] on the arc that leads to t; 0 up to the start, and from the end on."""
-        if self.root is None or not self._first < t < self.end:
+        if self._root is None or not self._first < t < self._end:
             return 0.0, 0.0
         index = self.index_at(t)
         leaf, i, offset = self._locate(index)
@@ -142,15 +147,15 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
             tail: Index, in this timeline, of the first segment that stays after the new ones; None for none.
             tail_start: Time at which the tail starts [s].
         """
-        start, height = self.start, self.height
+        start, height = self._start, self._height
         left, last = self._cut(cut)
-        here = self._last() if cut >= self.end else self.posture_at(cut)
+        here = self._last() if cut >= self._end else self.posture_at(cut)
         begin, made = cut, list(pieces)
-        if self.root is None or not self._first <= cut < self.end:
+        if self._root is None or not self._first <= cut < self._end:
             start = min(start, cut)
-            if cut > self.end:
-                made.insert(0, ArcPiece(cut - self.end, 0.0, 0.0, HOLD))
-                begin = self.end
+            if cut > self._end:
+                made.insert(0, ArcPiece(cut - self._end, 0.0, 0.0, HOLD))
+                begin = self._end
         starts, durations, owners, rows = array("d"), array("d"), array("q"), list[bytes]()
         for duration, v, w, owner in made:
             starts.append(begin)
@@ -169,13 +174,13 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
             data = displaced(arcs, (x, y, theta), here).tobytes()
             rows += [data[k : k + _row.size] for k in range(0, len(data), _row.size)]
         tree = splice(height, left, last, Run(starts, durations, owners, tuple(rows)))
-        return remade(ArcTimeline, self.initial, start, *tree, self.version + 1)
+        return remade(ArcTimeline, self._initial, start, *tree, self.version + 1)
 
     def _columns(self, low: int, high: int) -> tuple[Array, Array, array[float], array[int]]:
         """Starts (m,), rows (m, 5), durations and owners of the segments low to high − 1."""
         starts, rows = [np.empty(0)], bytearray()
         durations, owners = array("d"), array("q")
-        for leaf, part, offset in leaves(self.root, self.height, low, high):
+        for leaf, part, offset in leaves(self._root, self._height, low, high):
             starts.append(offset + np.frombuffer(leaf.starts)[part])
             rows += b"".join(leaf.rows[part])
             durations += leaf.durations[part]
@@ -192,24 +197,24 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
             found = [self._find(moment) for moment in t.tolist()]
             return np.array([f[0] for f in found]), np.array([f[2] for f in found]).reshape(-1, _WIDTH)
         starts, rows, _, _ = self._columns(low, high)
-        begin, end = [self._first], [self.end]
-        standing = np.array([[*self.initial, 0.0, 0.0], [*self._last(), 0.0, 0.0]])
+        begin, end = [self._first], [self._end]
+        standing = np.array([[*self._initial, 0.0, 0.0], [*self._last(), 0.0, 0.0]])
         place = np.searchsorted(starts, t, side="right")
         place[t < self._first] = 0
-        place[t >= self.end] = len(starts) + 1
+        place[t >= self._end] = len(starts) + 1
         return np.concatenate([begin, starts, end])[place], np.concatenate([standing[:1], rows, standing[1:]])[
             place
         ]
 
     def _find(self, t: float) -> tuple[float, float, tuple[float, ...]]:
         """Start and end of the arc at a time, and x, y, θ at its start, v and ω."""
-        if not self._first <= t < self.end or self.root is None:
+        if not self._first <= t < self._end or self._root is None:
             if not math.isfinite(t):
                 raise NonFiniteTimeError(t)
-            if t < self._first or self.root is None:
-                x, y, theta = self.initial.tolist()
+            if t < self._first or self._root is None:
+                x, y, theta = self._initial.tolist()
                 return t, t, (x, y, theta, 0.0, 0.0)
-            return self.end, math.inf, (*self._last(), 0.0, 0.0)
+            return self._end, math.inf, (*self._last(), 0.0, 0.0)
         index, (_, leaf, i, offset) = self._way_at(t)
         end = offset + leaf.starts[i + 1] if i + 1 < leaf.count else self.start_of(index + 1)
         self._found = found = offset + leaf.starts[i], end, _row.unpack(leaf.rows[i])
@@ -223,7 +228,7 @@ class ArcTimeline(BaseTimeline[ArcSegment]):
                 x, y, theta, v, w = _row.unpack(leaf.rows[i])
                 self._final = advanced((x, y, theta), v, w, leaf.durations[i])
             else:
-                x, y, theta = self.initial.tolist()
+                x, y, theta = self._initial.tolist()
                 self._final = x, y, theta
         return self._final
 
