@@ -15,10 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.base import upright
 from robots.cubo import parameters as p
-from robots.mobile.drive_train import as_posture
 from robots.mobile.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, wheel
+from robots.mobile.shapes import links as on_wheels
 from robots.solids import Builder, LinkShape, drum, loft, slab
 from vrs.checks import finite_array
 from vrs.model import Array, frozen_array
@@ -134,19 +133,10 @@ def links(posture: ArrayLike, wheels: ArrayLike = (0.0, 0.0), limbs: Sequence[fl
     Raises:
         InvalidValueError: If something isn't finite or of the wrong shape.
     """
-    X_WR = upright(*as_posture("posture", posture))
-    poses = [X_WR]
-    turned = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
-    for angle, side in zip(turned, (-0.5, 0.5), strict=True):
-        c, s = math.cos(angle), math.sin(angle)
-        y, z = side * p.WHEEL_BASE, p.WHEEL_RADIUS
-        poses.append(X_WR @ np.array([[c, 0, s, 0], [0, 1, 0, y], [-s, 0, c, z], [0, 0, 0, 1.0]]))
-    poses.append(X_WR @ upright(*p.CUBO.casters[0], 0.0))
+    poses = on_wheels(p.CUBO, posture, wheels, (0.0,))
     angles = finite_array("limbs", limbs, (3,), "three finite angles [rad]").tolist()
-    poses += [
-        X_WR @ limb_pose(angle, limb.joint, limb.axis) for angle, limb in zip(angles, p.CUBO.limbs, strict=True)
-    ]
-    return frozen_array(np.stack(poses))
+    swung = [limb_pose(angle, limb.joint, limb.axis) for angle, limb in zip(angles, p.CUBO.limbs, strict=True)]
+    return frozen_array(np.concatenate([poses, poses[0] @ np.stack(swung)]))
 
 
 def limb_pose(angle: float, joint: tuple[float, float, float], axis: tuple[float, float, float]) -> Array:

@@ -147,17 +147,18 @@ def links(
         chassis: Of the robot.
         posture: x, y [m], θ [rad], (3,).
         wheels: Angles that the right and the left wheel have turned by [rad], (2,).
-        casters: Where the casters' forks point, 0 behind their axes [rad], (2,).
+        casters: Where the casters' forks point, 0 behind their axes [rad], (c,).
 
     Returns:
-        (5, 4, 4).
+        (3 + c, 4, 4).
 
     Raises:
         InvalidValueError: If something isn't finite or of the wrong shape.
     """
     x, y, theta = as_posture("posture", posture)
     right, left = finite_array("wheels", wheels, (2,), "two finite angles [rad]").tolist()
-    swivels = finite_array("casters", casters, (2,), "two finite angles [rad]").tolist()
+    shape = (len(chassis.casters),)
+    swivels = finite_array("casters", casters, shape, "a finite angle a caster [rad]").tolist()
     X_WR = upright(x, y, theta)
     poses = [X_WR]
     for angle, side in ((right, -0.5), (left, 0.5)):
