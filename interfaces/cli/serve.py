@@ -186,22 +186,13 @@ def serve(
     if record is not None and not robot.is_base:
         options += ["--reports", f"{RATE:g}"]
     access = access_for(host, token_file, free=OPEN)
-    val = _Val(val_port, val_files) if speaks_val(robot) else None
+    port_of_val, files_of_val = (val_port, val_files) if speaks_val(robot) else (None, None)
     eye = camera if robot.device(HeadCamera) else 0.0
     serving = _Serving(
-        robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye, val,
-        record, recordings, behind, architecture,
+        robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye,
+        port_of_val, files_of_val, record, recordings, behind, architecture,
     )  # fmt: skip
     uvloop.run(_serve(serving, access))
-
-
-@dataclass(frozen=True, slots=True)
-class _Val:
-    """VAL-II's terminals."""
-
-    port: int | None
-    """Of those over TCP; None for none."""
-    files: Path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,8 +220,10 @@ class _Serving:
     """Where its list of jobs is kept."""
     camera: float
     """Pictures a second; 0 for none, nor voice and screen."""
-    val: _Val | None
-    """None where VAL-II has no places for the robot."""
+    val_port: int | None
+    """Of VAL-II's terminals over TCP; None for none."""
+    val_files: Path | None
+    """Of VAL-II; None where it has no places for the robot."""
     record: Path | None
     """Where everything is recorded to; None for nowhere."""
     recordings: Path
@@ -267,14 +260,14 @@ async def _serve(serving: _Serving, access: Access) -> None:
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    served, host, val = serving.robot, serving.host, serving.val
+    served, host, val_files = serving.robot, serving.host, serving.val_files
     async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
         listening = stack.enter_context(contextlib.closing(sockets.bind(host, serving.port)))
         port = listening.getsockname()[1]
         shown = Address(host, port)
         val_listening = None
-        if val is not None and val.port is not None:
-            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", val.port)))
+        if serving.val_port is not None:
+            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", serving.val_port)))
         lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options, lost.set_result))
         stack.push_async_callback(abandon, robot)
@@ -299,10 +292,10 @@ async def _serve(serving: _Serving, access: Access) -> None:
         recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
         routes = [*operator.routes, *recordings.routes]
         parts: list[AbstractAsyncContextManager[object]] = [operator.running(), recordings.running()]
-        if val is not None:
+        if val_files is not None:
             assert isinstance(operator.twins, ArmTwins)
             client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
-            room = served_room(client, operator.twins.operator, val.files, software())
+            room = served_room(client, operator.twins.operator, val_files, software())
             routes.append(PageTerminalServer(room, access).route)
         app = application([*routes, *station.routes], serving.allowed(port))
         for part in (sockets.serve(app, listening), *parts):
@@ -358,7 +351,7 @@ def _station(serving: _Serving) -> Station:
     robot = serving.robot
     offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
     offers |= {Offer.CAMERA} if serving.camera else set()
-    offers |= {Offer.TERMINALS} if serving.val is not None else set()
+    offers |= {Offer.TERMINALS} if serving.val_files is not None else set()
     return Station(described(robot), panels_of(offers))
 
 

@@ -65,6 +65,9 @@ class SegmentSource:
     It's evaluated at any time, at any rate, without asking.
     """
 
+    delay = 0.0
+    """Nothing need be asked for [s]."""
+
     def __init__(self, port: RemotePort, *, resend: float, lead: float = 0.0) -> None:
         self._port, self._lead = port, lead
         self._resend = interval_of(resend)
@@ -85,11 +88,6 @@ class SegmentSource:
         """The copy; None until the whole timeline so far has come."""
         self.past = -math.inf
         """Up to this time [s] the copy is what happened."""
-
-    @property
-    def delay(self) -> float:
-        """Nothing need be asked for [s]."""
-        return 0.0
 
     @property
     def span(self) -> tuple[float, float] | None:
@@ -246,7 +244,8 @@ class FrameSource:
         self._falsified: tuple[tuple[int, int, int | None], ...] = ()
         self._last: Frame | None = None
         self._settled: list[FrameVerdict] = []
-        self._scene: Scene | None = None
+        self.scene: Scene | None = None
+        """What there is to see."""
         self.live = LiveEdge()
 
     @property
@@ -255,19 +254,14 @@ class FrameSource:
         return self._round_trip + LEAD if self._round_trip else 0.0
 
     @property
-    def scene(self) -> Scene | None:
-        """What there is to see."""
-        return self._scene
-
-    @property
     def span(self) -> tuple[float, float] | None:
         """From the start of the timeline on [s]; where it ends by now, frames don't say."""
-        return None if self._scene is None else (self._scene.start, math.inf)
+        return None if self.scene is None else (self.scene.start, math.inf)
 
     def receive(self, message: Reply, *, now: float) -> None:
         """Take a frame or the scene; answers come by the observer."""
         if isinstance(message, Scene) and message.number == self._follow.number:
-            self._scene = message
+            self.scene = message
             if message.rate is None:
                 self.live.heard(message.now, now=now)
             else:
@@ -275,7 +269,7 @@ class FrameSource:
         elif isinstance(message, Broadcast):
             self.live.heard(message.frame.t, now=now)
             self._take(message)
-        elif isinstance(message, Compact) and self._scene is not None:
+        elif isinstance(message, Compact) and self.scene is not None:
             self._unpack(message, now)
 
     def _take(self, message: Broadcast) -> None:
@@ -301,15 +295,15 @@ class FrameSource:
     @property
     def _waited(self) -> float:
         """How long a frame waits for others, at most [s]: whole periods."""
-        rate = None if self._scene is None else self._scene.rate
+        rate = None if self.scene is None else self.scene.rate
         return int(self._follow.delay * rate + 1e-6) / rate if rate else 0.0
 
     @property
     def _lacking(self) -> bool:
         """Whether the scene is to be asked for, and with it a key frame."""
-        if self._scene is None:
+        if self.scene is None:
             return True
-        return self._follow.form is ViewForm.COMPACT and self._scene.rate is not None and self._decoder.lacking
+        return self._follow.form is ViewForm.COMPACT and self.scene.rate is not None and self._decoder.lacking
 
     def _judge(self, message: Broadcast) -> None:
         """Learn what became of the frames that were shown; the older come first."""

@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import islice
 from typing import Any, TypeAlias, TypeVar
 
 from interfaces.lab.claims import Findings, Paper, Reproduction, Study
@@ -89,17 +90,10 @@ def reproduce(
     Raises:
         InvalidValueError: If there are too few or too many workers.
     """
-    cases = [(i, k) for i, part in enumerate(paper.parts) for k in range(len(part.cases))]
-    made = pooled(
-        [(paper.parts[i].work, (study, paper.parts[i].cases[k])) for i, k in cases],
-        workers=workers,
-        progress=lambda place: progress(paper.parts[cases[place][0]].title),
-    )
-    found = dict(zip(cases, made, strict=True))
-    concluded = [
-        part.conclude(study, tuple(found[i, k] for k in range(len(part.cases))))
-        for i, part in enumerate(paper.parts)
-    ]
+    cases = [(part, case) for part in paper.parts for case in part.cases]
+    calls = [(part.work, (study, case)) for part, case in cases]
+    found = iter(pooled(calls, workers=workers, progress=lambda place: progress(cases[place][0].title)))
+    concluded = [part.conclude(study, tuple(islice(found, len(part.cases)))) for part in paper.parts]
     return Reproduction(paper, study, joined(concluded))
 
 

@@ -156,7 +156,7 @@ class Channel(Generic[T]):
         arrival = fate.arrivals[0]
         self._fly(payload, now, arrival, PacketRecord(number, size, now, arrival))
         for copy in fate.arrivals[1:]:
-            self.log.copied()
+            self.log.sums.copies += 1
             if len(self._flight) >= self.conditions.capacity:
                 self.log.settle(PacketRecord(number, size, now, None, LossReason.CAPACITY, copy=True))
             else:
@@ -219,7 +219,7 @@ class Channel(Generic[T]):
             elif packet.attempts >= self.conditions.attempts:
                 self._give_up(packet, t)
             else:
-                self.log.resent()
+                self.log.sums.resent += 1
                 self._transmit(packet, t)
 
     def _transmit(self, packet: _Waiting[T], t: float) -> None:
@@ -232,8 +232,8 @@ class Channel(Generic[T]):
             self._newest = max(self._newest, arrival)
             self._at(arrival, packet.place, lands=True)
             for _ in fate.arrivals[1:]:
-                self.log.copied()
-                self.log.discarded()
+                self.log.sums.copies += 1
+                self.log.sums.discarded += 1
         else:
             timeout = self.conditions.retransmit_after * 2.0 ** min(packet.attempts - 1, 16)
             self._at(fate.departure + min(timeout, LONGEST_TIMEOUT), packet.place, lands=False)

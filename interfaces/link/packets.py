@@ -87,32 +87,21 @@ class PacketLog:
 
     def __init__(self, keep: int = MAX_RECORDS) -> None:
         self._records: deque[PacketRecord] = deque(maxlen=keep)
-        self._totals = Totals()
+        self.sums = Totals()
+        """The sums so far, to be added to; see `totals`."""
         self._delay_sum = 0.0
         self.told: Callable[[PacketRecord], None] | None = None
         """Is told what became of each packet, at once."""
 
     def sent(self, size: int) -> int:
         """Count a packet of `size` bytes that was sent, and return its number, from 0."""
-        self._totals.sent += 1
-        self._totals.bytes_sent += size
-        return self._totals.sent - 1
-
-    def copied(self) -> None:
-        """Count a second copy."""
-        self._totals.copies += 1
-
-    def discarded(self) -> None:
-        """Count a second copy that was thrown away on arrival."""
-        self._totals.discarded += 1
-
-    def resent(self) -> None:
-        """Count another attempt."""
-        self._totals.resent += 1
+        self.sums.sent += 1
+        self.sums.bytes_sent += size
+        return self.sums.sent - 1
 
     def settle(self, record: PacketRecord) -> None:
         """Keep what became of a packet."""
-        totals = self._totals
+        totals = self.sums
         totals.forgotten += len(self._records) == self._records.maxlen
         self._records.append(record)
         if self.told is not None:
@@ -136,7 +125,7 @@ class PacketLog:
 
     def totals(self) -> Totals:
         """The sums so far."""
-        return replace(self._totals, lost=dict(sorted(self._totals.lost.items())))
+        return replace(self.sums, lost=dict(sorted(self.sums.lost.items())))
 
 
 WINDOW = 30.0

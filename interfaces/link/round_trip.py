@@ -150,33 +150,6 @@ class DelayStatistics(SlidingQuantiles):
         return self._jitter
 
 
-class RelativeDelays(DelayStatistics):
-    """One-way delays up to an unknown constant: the receiver's stamp less the sender's.
-
-    The offset between the two clocks shifts every delay and every quantile alike. A play-out needs the receiver's
-    time at which the given share of messages have come: the sender's stamp plus the quantile.
-    Drift of 100 ppm moves a quantile by 6 ms in a minute: keep the horizon short. After a step of either clock call
-    `clear`, or hand over stamps that `ClockSync.unstepped` has mended.
-    """
-
-    def receive(self, sent: float, *, now: float) -> float:
-        """Take note of a message that has arrived.
-
-        Args:
-            sent: Its stamp in the sender's clock [s].
-            now: Time of arrival in the receiver's clock [s], not before that of the last.
-
-        Returns:
-            The relative delay [s]; negative where the sender's clock is far ahead.
-
-        Raises:
-            InvalidValueError: If a time isn't finite, or now runs back.
-        """
-        delay = finite("now", now, "finite seconds") - finite("sent", sent, "finite seconds")
-        self.add(delay, now=now)
-        return delay
-
-
 class RoundTripEstimator:
     """Probes a link and keeps statistics of the round trips.
 

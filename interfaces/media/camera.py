@@ -142,14 +142,10 @@ class LiveCamera:
         since = self._clock.now() - _COUNTED
         return sum(t > since for t in self._times) / _COUNTED
 
-    def need_key(self) -> None:
-        """Let the next picture be a whole one: somebody has come who knows none before it."""
-        self._key = True
-
     def watch(self, watcher: Callable[[Taken, float], None]) -> None:
         """Give somebody each picture from now on, a whole one first."""
         self.watchers.add(watcher)
-        self.need_key()
+        self._key = True
 
     async def still(self) -> bytes:
         """A picture by itself, as JPEG.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Final
@@ -58,23 +58,28 @@ class Ranges:
             raise InvalidValueError("tau_high", self.tau_high, f"in ({self.tau_low:g}, 1000] s")
 
 
-@dataclass(frozen=True, slots=True)
-class GainNetwork:
-    """A trained network, as a value."""
+class GainNetwork(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A trained network, as a value and as it stands in a file."""
 
+    schema: str
+    """`SCHEMA`."""
+    formulation: Formulation
     epsilon: float
     """Tolerance ε of J that it was trained for, in [1e-6, 3]."""
+    A_max: float
+    """Largest |A| that it was trained on [1/m]; beyond this and outside of the delays it says nothing."""
+    tau_low: float
+    """Smallest delay [s]."""
+    tau_high: float
+    """Largest delay [s]."""
+    seed: int
+    """Of the weights that it began with."""
+    epochs: int
+    """How long it was trained."""
     neurons: tuple[tuple[float, float, float, float], ...]
     """Of each hidden neuron the weights of both inputs, the bias, and the weight of its output."""
     bias: float
     """Of the output."""
-    formulation: Formulation = Formulation.LOGARITHMIC
-    ranges: Ranges = field(default_factory=Ranges)
-    """Outside of these it says nothing."""
-    seed: int = 0
-    """Of the weights that it began with."""
-    epochs: int = 0
-    """How long it was trained."""
 
     def __post_init__(self) -> None:
         tolerance(self.epsilon)
@@ -84,11 +89,16 @@ class GainNetwork:
             if len(row) != 4 or not all(math.isfinite(weight) for weight in row):
                 raise InvalidValueError("neurons", row, "rows of four finite numbers")
         finite("bias", self.bias)
+        Ranges(self.A_max, self.tau_low, self.tau_high)
+
+    @property
+    def ranges(self) -> Ranges:
+        """What it was trained on."""
+        return Ranges(self.A_max, self.tau_low, self.tau_high)
 
     def covers(self, A: float, tau: float) -> bool:
         """Whether it was trained on such a factor A [1/m] and delay τ [s]."""
-        ranges = self.ranges
-        return abs(A) <= ranges.A_max and ranges.tau_low <= tau <= ranges.tau_high
+        return abs(A) <= self.A_max and self.tau_low <= tau <= self.tau_high
 
     def gain(self, A: float, tau: float) -> float:
         """Return what it takes K* to be [m/s].
@@ -115,34 +125,7 @@ class GainNetwork:
 
     def to_json(self) -> str:
         """The whole network as a document, every digit kept."""
-        document = _Document(
-            schema=SCHEMA,
-            formulation=self.formulation.value,
-            epsilon=self.epsilon,
-            A_max=self.ranges.A_max,
-            tau_low=self.ranges.tau_low,
-            tau_high=self.ranges.tau_high,
-            seed=self.seed,
-            epochs=self.epochs,
-            neurons=list(self.neurons),
-            bias=self.bias,
-        )
-        return msgspec.json.format(msgspec.json.encode(document), indent=1).decode() + "\n"
-
-
-class _Document(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A network in a file."""
-
-    schema: str
-    formulation: str
-    epsilon: float
-    A_max: float
-    tau_low: float
-    tau_high: float
-    seed: int
-    epochs: int
-    neurons: list[tuple[float, float, float, float]]
-    bias: float
+        return msgspec.json.format(msgspec.json.encode(self), indent=1).decode() + "\n"
 
 
 def inputs(formulation: Formulation, A: ArrayLike, tau: ArrayLike) -> Array:
@@ -164,23 +147,14 @@ def read_network(text: bytes | str, where: str = "network") -> GainNetwork:
         FormatError: If it isn't one.
     """
     try:
-        found = msgspec.json.decode(text, type=_Document)
+        found = msgspec.json.decode(text, type=GainNetwork)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        if isinstance(error.__cause__, InvalidValueError):
+            raise FormatError(where, str(error.__cause__)) from None
         raise FormatError(where, f"isn't a gain network: {error}") from None
     if found.schema != SCHEMA:
         raise FormatError(where, f"its schema must be {SCHEMA!r}; given: {found.schema!r}")
-    try:
-        return GainNetwork(
-            epsilon=found.epsilon,
-            neurons=tuple(found.neurons),
-            bias=found.bias,
-            formulation=Formulation(found.formulation),
-            ranges=Ranges(found.A_max, found.tau_low, found.tau_high),
-            seed=found.seed,
-            epochs=found.epochs,
-        )
-    except ValueError as error:
-        raise FormatError(where, str(error)) from None
+    return found
 
 
 def load_network(path: Path | str) -> GainNetwork:
@@ -359,11 +333,12 @@ def _network(
     rows[:, 2] -= rows[:, :2] @ middle
     rows[:, 3] *= y[1]
     return GainNetwork(
-        epsilon=config.epsilon,
-        neurons=tuple((a, b, c, d) for a, b, c, d in rows.tolist()),
-        bias=float(weights[-1, 0]) * y[1] + y[0],
+        schema=SCHEMA,
         formulation=config.formulation,
-        ranges=config.ranges,
+        epsilon=config.epsilon,
+        **asdict(config.ranges),
         seed=seed,
         epochs=epochs,
+        neurons=tuple((a, b, c, d) for a, b, c, d in rows.tolist()),
+        bias=float(weights[-1, 0]) * y[1] + y[0],
     )

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -118,10 +118,6 @@ def _order(name: str) -> tuple[int, list[tuple[int, int | str]]]:
     return (0 if name.isupper() and len(name) > 1 else 1 if name[0].isupper() else 2), parts
 
 
-def _in_order(names: Iterable[str]) -> list[str]:
-    return sorted(names, key=_order)
-
-
 def package(model: RobotModel) -> dict[str, str]:
     """The files of a robot's package, by name.
 
@@ -149,7 +145,7 @@ def package(model: RobotModel) -> dict[str, str]:
         "elements": elements,
         "packed": [one for one in elements if one["valued"] and one["kind"] != "Monitor"],
         "model_imports": sorted({"RobotModel", *enums, *(type(element).__name__ for element in model)}),
-        "in_order": _in_order,
+        "in_order": partial(sorted, key=_order),
     }
     return {name: templates.get_template(f"{name}.j2").render(said) for name in FILES} | {"py.typed": ""}
 

@@ -165,8 +165,8 @@ class StreamDevice(Device):
             return len(self._middleware.core.streams)
 
 
-class SensorDevice(Requested, Generic[V]):
-    """A sensor or a monitor."""
+class ToldDevice(Requested, Generic[V]):
+    """What the robot tells in values."""
 
     @override
     def __init__(self, middleware: Middleware, name: str) -> None:
@@ -174,8 +174,19 @@ class SensorDevice(Requested, Generic[V]):
         element = middleware.model.elements[self._index]
         if isinstance(element, Monitor):
             element = middleware.model.effector_of(element)
-        assert isinstance(element, Sensor | Effector)
+        assert isinstance(element, Sensor | Effector | Event)
         self._format = element.format
+
+    def add_listener(self, listener: Callable[[tuple[V, ...]], None]) -> Callable[[], None]:
+        """Let something be called with the values each time they come; returns what ends that."""
+        return self._middleware.listen(self._index, lambda payload: listener(self._unpacked(payload)))
+
+    def _unpacked(self, payload: bytes) -> tuple[V, ...]:
+        return cast("tuple[V, ...]", self._format.unpack(payload))
+
+
+class SensorDevice(ToldDevice[V]):
+    """A sensor or a monitor."""
 
     def read(self, index: int) -> V:
         """One value, raw as on the wire.
@@ -210,13 +221,6 @@ class SensorDevice(Requested, Generic[V]):
             return self._unpacked(payload) if payload is not None and count != before else None
 
         return self._await(fetch, timeout)
-
-    def add_listener(self, listener: Callable[[tuple[V, ...]], None]) -> Callable[[], None]:
-        """Let something be called with the values each time they come; returns what ends that."""
-        return self._middleware.listen(self._index, lambda payload: listener(self._unpacked(payload)))
-
-    def _unpacked(self, payload: bytes) -> tuple[V, ...]:
-        return cast("tuple[V, ...]", self._format.unpack(payload))
 
 
 class CommandTicket:
@@ -266,7 +270,7 @@ class ModuleDevice(Requested):
     """A set of sensors, monitors and events."""
 
 
-class EventDevice(Requested, Generic[V]):
+class EventDevice(ToldDevice[V]):
     """An event."""
 
     def wait(self, timeout: float) -> tuple[V, ...]:
@@ -276,15 +280,6 @@ class EventDevice(Requested, Generic[V]):
             DeadlineError: If none came in time.
         """
         return self._unpacked(self._await(lambda: self._middleware.came(self._index), timeout))
-
-    def add_listener(self, listener: Callable[[tuple[V, ...]], None]) -> Callable[[], None]:
-        """Let something be called with the values of each; returns what ends that."""
-        return self._middleware.listen(self._index, lambda payload: listener(self._unpacked(payload)))
-
-    def _unpacked(self, payload: bytes) -> tuple[V, ...]:
-        element = self._middleware.model.elements[self._index]
-        assert isinstance(element, Event)
-        return cast("tuple[V, ...]", element.format.unpack(payload))
 
 
 class MemoryCommandDevice(Device):

@@ -11,15 +11,27 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Final
 
-from interfaces.rsp import handshake, header
-from interfaces.rsp.errors import PacketError, RspError
+from typing_extensions import override
+
+from interfaces.rsp import handshake
+from interfaces.rsp.errors import RspError
 from interfaces.rsp.handshake import Open
 from interfaces.rsp.header import MODULUS, Header, PacketType
-from interfaces.rsp.layout import ID, Layout, PacketDirection
+from interfaces.rsp.layout import ID, PacketDirection
 from interfaces.rsp.model.elements import Effector, Event, MemoryCommand, MemoryEvent, RobotModel
 from interfaces.rsp.motion_filter import Fastest
-from interfaces.rsp.outbox import CommandOutbox, MemoryInbox, MemoryOutbox, StreamOutbox, ValueOutbox
-from interfaces.rsp.outputs import Began, EndReason, LocalOutput, Occurred, Refused, SessionEnded, Stored, Told
+from interfaces.rsp.outbox import CommandOutbox, StreamOutbox, ValueOutbox
+from interfaces.rsp.outputs import (
+    Began,
+    EndReason,
+    LocalOutput,
+    Occurred,
+    Refused,
+    SessionCore,
+    SessionEnded,
+    Stored,
+    Told,
+)
 from interfaces.rsp.session import (
     SLACK,
     TAG,
@@ -27,7 +39,6 @@ from interfaces.rsp.session import (
     Keyring,
     PacketCipher,
     PacketDropped,
-    PacketRoundTrip,
     Rank,
     SessionNumbers,
     milliseconds,
@@ -152,8 +163,10 @@ class LocalConfig:
     more."""
 
 
-class LocalCore:
+class LocalCore(SessionCore[LocalOutput]):
     """The local system of one robot."""
+
+    way = PacketDirection.DOWN
 
     def __init__(
         self,
@@ -178,15 +191,11 @@ class LocalCore:
         """
         if keys is not None and rank not in keys:
             raise InvalidValueError("rank", rank.name.lower(), "one that there's a key for")
-        self.model, self.layout = model, Layout(model)
         self._config = LocalConfig() if config is None else config
+        super().__init__(model, self._config.timeout, sealed=keys is not None)
         self._keys, self._rank, self._random = keys, rank, random_bytes
         self.state = LocalState.CLOSED
-        self.dropped = dict.fromkeys(DropReason, 0)
-        """Datagrams that were dropped, by reason."""
-        self.streams = StreamOutbox(model.buffers)
         self.period = PeriodControl(self._config.period)
-        self.waiting_outputs: list[LocalOutput] = []
         self.opening = Open(rank, False, bytes(TAG))
         self.numbers: SessionNumbers | None = None
         """Of the session; None where there's none."""
@@ -197,12 +206,10 @@ class LocalCore:
         self._reset()
 
     def _reset(self) -> None:
-        self.command_outbox, self._inbox = CommandOutbox(), MemoryInbox()
-        self.memory_outbox = MemoryOutbox(self.layout.room[PacketDirection.DOWN])
-        """What isn't acknowledged."""
+        self._renew()
+        self.command_outbox = CommandOutbox()
         self._values = ValueOutbox()
         self._events: dict[int, int] = {}
-        self.packet_round_trip = PacketRoundTrip()
         self._clears = 0
         self.streams = StreamOutbox(self.model.buffers)
 
@@ -257,16 +264,6 @@ class LocalCore:
         """
         return self.command_outbox.put(index, values)
 
-    def store(self, index: int, data: bytes, *, deadline: float) -> int:
-        """Give a memory command that must be settled by a time [s]; returns its ID.
-
-        Raises:
-            InvalidValueError: If the data is too long.
-            FullError: If too many wait.
-        """
-        self.layout.check_data(index, data)
-        return self.memory_outbox.put(index, data, deadline)
-
     def play(self, index: int, data: bytes) -> None:
         """Send data to a stream.
 
@@ -283,15 +280,6 @@ class LocalCore:
         self.streams.clear()
 
     # Packets.
-
-    def receive(self, data: bytes, *, now: float) -> None:
-        """Take a datagram; whatever it holds, nothing is raised."""
-        try:
-            self._receive(data, now)
-        except PacketError:
-            self.dropped[DropReason.MALFORMED] += 1
-        except PacketDropped as drop:
-            self.dropped[drop.reason] += 1
 
     def to_send(self, *, now: float) -> list[bytes]:
         """Datagrams that are due by now [s]."""
@@ -322,28 +310,17 @@ class LocalCore:
         """When something is to be sent [s]; None while closed."""
         return None if self.state is LocalState.CLOSED else self._next
 
-    def take(self) -> list[LocalOutput]:
-        """What happened since the last call."""
-        outputs, self.waiting_outputs = self.waiting_outputs, []
-        return outputs
-
     def _down(self, session: SessionNumbers, now: float) -> bytes:
         number = session.number
         payloads: dict[int, bytes] = dict.fromkeys(self._requested, b"")
         self._values.fill(payloads, number, self._values.unknown | self._active)
         self.command_outbox.fill(payloads, number)
-        self.memory_outbox.fill(payloads, now=now, timeout=max(self._config.timeout, 2 * (self.round_trip or 0.0)))
-        self._inbox.fill(payloads, number)
+        self._fill(payloads, number, now)
         self.streams.fill(payloads, number, self.layout.left(payloads))
-        self.packet_round_trip.sent(number, now)
         return session.make(PacketType.DOWN, self.layout.join(payloads), now, self._clears)
 
-    def _receive(self, data: bytes, now: float) -> None:
-        head = header.decode(data)
-        if head.model != self.model.id:
-            raise PacketDropped(DropReason.MODEL)
-        if head.encrypted != (self._keys is not None):
-            raise PacketDropped(DropReason.DOWNGRADE)
+    @override
+    def _receive(self, head: Header, data: bytes, address: bytes, now: float) -> None:
         session = self.numbers
         if session is None or head.type not in _EXPECTED[self.state]:
             raise PacketDropped(DropReason.UNEXPECTED)

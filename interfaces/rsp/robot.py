@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Final
 
-from interfaces.rsp import header
+from typing_extensions import override
+
 from interfaces.rsp.errors import PacketError
 from interfaces.rsp.handshake import SessionClaim, SessionDoor
 from interfaces.rsp.header import HALF, MODULUS, STAMPS, Header, PacketType, unwrapped
-from interfaces.rsp.layout import ID, Layout, PacketDirection
+from interfaces.rsp.layout import ID, PacketDirection
 from interfaces.rsp.model.elements import (
     Command,
     Effector,
@@ -28,17 +29,18 @@ from interfaces.rsp.model.elements import (
     Scalar,
 )
 from interfaces.rsp.motion_filter import MotionFilter, MotionFilterConfig, Values
-from interfaces.rsp.outbox import MemoryInbox, MemoryOutbox, StreamInbox, ValueOutbox
+from interfaces.rsp.outbox import StreamInbox, ValueOutbox
 from interfaces.rsp.outputs import (
     Began,
     Commanded,
     EndReason,
     RobotChange,
     RobotOutput,
+    SessionCore,
     SessionEnded,
     Stored,
 )
-from interfaces.rsp.session import SLACK, DropReason, Keyring, PacketDropped, PacketRoundTrip
+from interfaces.rsp.session import SLACK, DropReason, Keyring, PacketDropped
 from vrs.checks import validated, within
 
 MOST_EVENTS: Final = 256
@@ -155,8 +157,10 @@ class RobotConfig:
     """How motion is played."""
 
 
-class RobotCore:
+class RobotCore(SessionCore[RobotOutput]):
     """One robot's side."""
+
+    way = PacketDirection.UP
 
     def __init__(
         self,
@@ -174,20 +178,16 @@ class RobotCore:
             config: How it works.
             keys: Of who may open a session; everything is sealed then, and only then.
         """
-        self.model, self.layout = model, Layout(model)
         self._config = RobotConfig() if config is None else config
-        self._sealed = keys is not None
+        super().__init__(model, self._config.timeout, sealed=keys is not None)
         self.door = SessionDoor(
             model.id, random_bytes, keys, idle=self._config.idle, takeover=self._config.takeover
         )
-        self.dropped = dict.fromkeys(DropReason, 0)
-        """Datagrams that were dropped, by reason."""
         self.motion = MotionFilter(model, self._config.filter)
         self.streams = StreamInbox(model.buffers)
         self._formats = {i: e.format for i, e in enumerate(model) if isinstance(e, Effector) and not e.stream}
         self._limits = {i: e.wire_limits for i, e in enumerate(model) if isinstance(e, Effector)}
         self._floats = {i: e for i, e in enumerate(model) if isinstance(e, Command) and e.type is Scalar.F32}
-        self.waiting_outputs: list[RobotOutput] = []
         self.claim: SessionClaim | None = None
         """The session that has the robot."""
         self._over: SessionClaim | None = None
@@ -210,9 +210,7 @@ class RobotCore:
                 self.motion.set(index, values)
         self._changed |= {index for index in self._formats if self.motion.given(index) != given[index]}
         self._command = -1
-        self._inbox, self.packet_round_trip = MemoryInbox(), PacketRoundTrip()
-        self.memory_outbox = MemoryOutbox(self.layout.room[PacketDirection.UP])
-        """What isn't acknowledged."""
+        self._renew()
         self._telling.reset()
         self._clears = 0
         self._told: dict[int, Values] = {}
@@ -244,16 +242,6 @@ class RobotCore:
         """
         return self._telling.occur(index, payload)
 
-    def store(self, index: int, data: bytes, *, deadline: float) -> int:
-        """Tell a memory event, to be settled by a time [s]; returns its ID.
-
-        Raises:
-            InvalidValueError: If the data is too long.
-            FullError: If too many wait.
-        """
-        self.layout.check_data(index, data)
-        return self.memory_outbox.put(index, data, deadline)
-
     def rested(self) -> None:
         """The body is at rest: a new session's packets count from now on."""
         self._stopping = False
@@ -270,15 +258,6 @@ class RobotCore:
         return changed
 
     # Packets.
-
-    def receive(self, data: bytes, address: bytes, *, now: float) -> None:
-        """Take a datagram from an address; whatever it holds, nothing is raised."""
-        try:
-            self._receive(data, address, now)
-        except PacketError:
-            self.dropped[DropReason.MALFORMED] += 1
-        except PacketDropped as drop:
-            self.dropped[drop.reason] += 1
 
     def to_send(self, *, now: float) -> list[tuple[bytes, bytes]]:
         """Datagrams that are due by now [s], each with its address."""
@@ -297,17 +276,8 @@ class RobotCore:
             return -math.inf
         return None if self.claim is None else self._next
 
-    def take(self) -> list[RobotOutput]:
-        """What happened since the last call."""
-        outputs, self.waiting_outputs = self.waiting_outputs, []
-        return outputs
-
-    def _receive(self, data: bytes, address: bytes, now: float) -> None:
-        head = header.decode(data)
-        if head.model != self.model.id:
-            raise PacketDropped(DropReason.MODEL)
-        if head.encrypted != self._sealed:
-            raise PacketDropped(DropReason.DOWNGRADE)
+    @override
+    def _receive(self, head: Header, data: bytes, address: bytes, now: float) -> None:
         if head.type is PacketType.OPEN:
             held = None if self.claim is None else self.heard
             self._answers += self.door.opened(head, data, address, held, now=now)
@@ -449,11 +419,7 @@ class RobotCore:
         number = claim.session.number
         payloads: dict[int, bytes] = {}
         self._telling.fill(payloads, number)
-        self.memory_outbox.fill(
-            payloads, now=now, timeout=max(self._config.timeout, 2 * (self.packet_round_trip.smoothed or 0.0))
-        )
-        self._inbox.fill(payloads, number)
-        self.packet_round_trip.sent(number, now)
+        self._fill(payloads, number, now)
         return claim.session.make(PacketType.UP, self.layout.join(payloads), now, min(self.streams.free, 255))
 
     def _watch(self, now: float) -> None:

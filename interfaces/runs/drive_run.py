@@ -154,11 +154,8 @@ COLUMNS = (*KEYS, "seed", *METRICS, "collisions", "limits_passed", "sent_bytes",
 class Row:
     """A run, in figures."""
 
-    architecture: str
-    transport: str
-    delay: str
-    robot: str
-    operator: str
+    group: tuple[str, ...]
+    """What it's one of several seeds of: see `KEYS`."""
     seed: int
     metrics: PathComparison
     collisions: int
@@ -168,17 +165,12 @@ class Row:
     longest_delay: float
     """Of a packet that was sent while the operator drove [s]."""
 
-    @property
-    def group(self) -> tuple[str, ...]:
-        """What it's one of several seeds of."""
-        return self.architecture, self.transport, self.delay, self.robot, self.operator
-
 
 def row_of(drive: DriveRun) -> Row:
     """The figures of a run."""
     case = drive.case
     return Row(
-        *case.group, case.seed, drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
+        case.group, case.seed, drive.compare(), drive.collisions, drive.limits_passed(), drive.sent_bytes,
         float(drive.delays[:, 1].max(initial=0.0)),
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Generic, TypeVar
 
 from interfaces.link.delays import share_of
-from interfaces.link.round_trip import RelativeDelays, WindowConfig
+from interfaces.link.quantiles import SlidingQuantiles
 from interfaces.messages.sites import SiteOrders
 from robots.onboard.watchdog import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import validated, within
@@ -221,7 +221,7 @@ class AdaptiveOffset:
 
     def __init__(self, config: OffsetConfig | None = None) -> None:
         self._config = OffsetConfig() if config is None else config
-        self._ages = RelativeDelays(WindowConfig(self._config.window, self._config.horizon))
+        self._ages = SlidingQuantiles(self._config.window, self._config.horizon)
 
     def heard(self, complete_until: float, *, now: float) -> None:
         """A message came.
@@ -230,7 +230,7 @@ class AdaptiveOffset:
             complete_until: Up to where the timeline was known to be complete before it [s].
             now: By the robot's clock [s].
         """
-        self._ages.receive(complete_until, now=now)
+        self._ages.add(now - complete_until, now=now)
 
     @property
     def D(self) -> float | None:

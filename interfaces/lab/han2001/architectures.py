@@ -136,7 +136,8 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
         robot, profile = case.split()
         drawn = of_drives(found[case].first, f"{robot}, {profile}, seed {study.seed}")
         figures += [replace(picture, name=f"{robot}_{picture.name}") for picture in drawn]
-    claims = (*_papers(study, found), *_ours(study, found))
+    ours = (claim for profile in PROFILES for claim in _of_network(study, profile, found[f"ipr {profile}"].runs))
+    claims = (*_papers(study, found), *ours)
     return Findings(claims, (_table(found),), tuple(figures))
 
 
@@ -223,13 +224,8 @@ def _speed(one: ArchitectureResult) -> float:
     return 100 * (one.path.speed_error or 0.0)
 
 
-def _ours(study: Study, found: dict[str, Results]) -> list[Claim]:
-    """What III and `timeline` must show on the 75 kg robot, network by network."""
-    return [claim for profile in PROFILES for claim in _of_network(study, profile, found[f"ipr {profile}"].runs)]
-
-
 def _of_network(study: Study, profile: str, runs: Runs) -> Iterator[Claim]:
-    """Claims about the 75 kg robot under one network."""
+    """What III and `timeline` must show on the 75 kg robot under one network."""
     slow = profile != "domain"
 
     def mean(who: str, value: Callable[[ArchitectureResult], float]) -> float:

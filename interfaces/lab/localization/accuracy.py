@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -68,17 +67,17 @@ class DrawnDrive:
         self.looks.append((tracker.seen_from, np.array(tracker.covariance), points))
 
 
-def scenes(given: Sequence[DrawnDrive]) -> list[Figure]:
-    """Pictures of the first scene, if there's one."""
-    if not given or given[0].record is None:
-        return []
-    scene, record = given[0], given[0].record
+def pictures(scene: DrawnDrive | None) -> tuple[Figure, ...]:
+    """Pictures of a drive, if there's one."""
+    if scene is None or scene.record is None:
+        return ()
+    record = scene.record
     what = f"{scene.room.name}, ellipses {SCALE:g} times as large"
     height = 7.2 * scene.room.width / scene.room.length
-    return [
+    return (
         draw("localization_map", f"Map, scans and estimates: {what}", _map, scene, record, height=height),
         draw("localization_errors", "Errors over time", _errors, record, height=4.2),
-    ]
+    )
 
 
 def _lines(ax: Axes, known: GspMap, colour: str, label: str, width: float) -> None:
@@ -211,8 +210,7 @@ def conclude_rooms(_study: Study, found: tuple[Results, ...]) -> Findings:
         claims += _accuracy(name, found)
     for name in (PLAN, AS_BUILT, BUILT):
         claims += _honesty(name, found)
-    pictures = scenes([one.scene for one in found if one.scene is not None])
-    return Findings(tuple(claims), (_pooled(found), _by_room(found)), tuple(pictures))
+    return Findings(tuple(claims), (_pooled(found), _by_room(found)), pictures(found[0].scene))
 
 
 def _accuracy(name: str, found: tuple[Results, ...]) -> list[Claim]:

@@ -111,7 +111,7 @@ def test_the_laboratory_says_what_its_intervals_are(runs: int, said: str) -> Non
 def _row(architecture: str, seed: int) -> Row:
     value = (1.0 if architecture == "I" else 2.0) + 0.01 * seed
     metrics = PathComparison(*([value] * 8), progress=1.0)
-    return Row(architecture, "datagrams", "mon", "bare", "slalom", seed, metrics, 0, 0, 100, 0.5)
+    return Row((architecture, "datagrams", "mon", "bare", "slalom"), seed, metrics, 0, 0, 100, 0.5)
 
 
 def test_runs_of_one_seed_are_no_more_news_than_one_of_them() -> None:

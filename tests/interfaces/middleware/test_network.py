@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -14,7 +15,6 @@ from interfaces.middleware.network import (
     DEFAULT_FILE,
     SCHEMA,
     Formulation,
-    GainNetwork,
     Ranges,
     TrainingConfig,
     default_network,
@@ -146,7 +146,7 @@ def test_what_is_no_network(text, said):
 def test_a_network_is_made_of_finite_numbers():
     for bad in ({"neurons": ((math.nan, 0.0, 0.0, 0.0),)}, {"bias": math.inf}):
         with pytest.raises(InvalidValueError):
-            GainNetwork(**({"epsilon": 0.25, "neurons": ((0.0, 0.0, 0.0, 0.0),), "bias": 0.0} | bad))
+            msgspec.structs.replace(default_network(), **bad)
 
 
 @pytest.mark.parametrize("bad", [
