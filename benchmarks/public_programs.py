@@ -215,7 +215,8 @@ def judged(
     texts = [row for row in checked if row["what"] not in OUT_OF_REACH]
     full = n == len(wanted) and len(texts) == len(checked)
     if n > len(wanted) or way > WAY or turn > TURN:
-        verdict, reason = WRONG, f"{n} motions, the evaluation has {len(wanted)} {unforeseen}".rstrip()
+        many = f"{n} motions, the evaluation has {len(wanted)} {unforeseen}".rstrip()
+        verdict, reason = WRONG, many if n > len(wanted) else "it stood elsewhere"
     elif (error is None or error.what == GIVEN_UP) and full:
         verdict, reason = RIGHT if n else STILL, "it has no end, and is given up" if error else ""
     elif error is None or error.what == GIVEN_UP:
