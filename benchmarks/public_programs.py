@@ -89,6 +89,8 @@ class Known:
     prelude: str
     files: Mapping[str, str]
     """Digests of files that it reads, by their names."""
+    given: Mapping[str, str]
+    """Texts of files that it reads and that are ours, by their names."""
     limit: float
     note: str
     """What a reader may want to know of it."""
@@ -103,13 +105,14 @@ def known() -> list[Known]:
             rows.append(
                 Known(
                     file["repository"], file["path"], file["sha256"], run["program"], "".join(sections),
-                    run.get("prelude", ""), run.get("files", {}), run.get("limit", LIMIT), run.get("note", ""),
+                    run.get("prelude", ""), run.get("files", {}), run.get("given", {}), run.get("limit", LIMIT),
+                    run.get("note", ""),
                 )
             )  # fmt: skip
     for path in ours():
         name = next(iter(Text(path.read_text(encoding="utf-8"), vplus=False).routines))
         where = path.relative_to(HOME.parent).as_posix()
-        rows.append(Known("", where, digest(path), name, "", "", {}, LIMIT, ""))
+        rows.append(Known("", where, digest(path), name, "", "", {}, {}, LIMIT, ""))
     return rows
 
 
@@ -138,14 +141,16 @@ def tried(one: Known, files: Mapping[str, Path]) -> Finding:
             f"{NAME}.v2": wrapped(one.program, one.prelude), path.name: text, "values.lc": one.values
         }.items():  # fmt: skip
             (here / name).write_text(said, encoding="utf-8")
-        given = here / "files"
-        given.mkdir()
-        for name, sha256 in one.files.items():
-            (given / name).write_bytes(files[sha256].read_bytes())
-            lines += files[sha256].read_text(encoding="utf-8").splitlines()
+        (here / "files").mkdir()
+        contents = {
+            name: files[sha256].read_text(encoding="utf-8") for name, sha256 in one.files.items()
+        } | one.given
+        for name, said in contents.items():
+            (here / "files" / name).write_text(said, encoding="utf-8")
+            lines += said.splitlines()
         words = (f"{NAME}.v2", path.name, "values.lc")
         checked = checks(here, words, dialect)
-        there, error = ran([here / word for word in words], given, here / "run.mcap", one.limit, dialect)
+        there, error = ran([here / word for word in words], here / "files", here / "run.mcap", one.limit, dialect)
     whole = Text(
         "\n".join([text, one.values, wrapped(one.program, one.prelude)]), bool(one.repository), path.stem.lower()
     )
