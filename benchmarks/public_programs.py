@@ -80,6 +80,7 @@ class Known:
     """A program of a file that is known."""
 
     repository: str
+    """Empty for ours, which are VAL-II; others are V+."""
     path: str
     sha256: str
     program: str
@@ -88,13 +89,15 @@ class Known:
     prelude: str
     files: Mapping[str, str]
     """Digests of files that it reads, by their names."""
+    given: Mapping[str, str]
+    """Texts of files that it reads and that are ours, by their names."""
     limit: float
     note: str
     """What a reader may want to know of it."""
 
 
 def known() -> list[Known]:
-    """Every program of the table."""
+    """Every program of the table: those of others, and then ours from textbooks' descriptions."""
     rows = []
     for file in tomllib.loads(TABLE.read_text(encoding="utf-8"))["file"]:
         for run in file["run"]:
@@ -102,10 +105,20 @@ def known() -> list[Known]:
             rows.append(
                 Known(
                     file["repository"], file["path"], file["sha256"], run["program"], "".join(sections),
-                    run.get("prelude", ""), run.get("files", {}), run.get("limit", LIMIT), run.get("note", ""),
+                    run.get("prelude", ""), run.get("files", {}), run.get("given", {}), run.get("limit", LIMIT),
+                    run.get("note", ""),
                 )
             )  # fmt: skip
+    for path in ours():
+        name = next(iter(Text(path.read_text(encoding="utf-8"), vplus=False).routines))
+        where = path.relative_to(HOME.parent).as_posix()
+        rows.append(Known("", where, digest(path), name, "", "", {}, {}, LIMIT, ""))
     return rows
+
+
+def ours() -> list[Path]:
+    """The files of our own programs."""
+    return sorted((HOME.parent / "examples" / "val2" / "textbook").glob("*.v2"))
 
 
 SECTIONS = ("locations", "reals", "signals")
@@ -121,29 +134,34 @@ def tried(one: Known, files: Mapping[str, Path]) -> Finding:
         files: Where files are, by their digests.
     """
     path, text = PurePosixPath(one.path), files[one.sha256].read_text(encoding="utf-8")
-    lines = list[str]()
+    lines, dialect = list[str](), "vplus" if one.repository else "val2"
     with tempfile.TemporaryDirectory() as made:
         here = Path(made)
         for name, said in {
             f"{NAME}.v2": wrapped(one.program, one.prelude), path.name: text, "values.lc": one.values
         }.items():  # fmt: skip
             (here / name).write_text(said, encoding="utf-8")
-        given = here / "files"
-        given.mkdir()
-        for name, sha256 in one.files.items():
-            (given / name).write_bytes(files[sha256].read_bytes())
-            lines += files[sha256].read_text(encoding="utf-8").splitlines()
+        (here / "files").mkdir()
+        contents = {
+            name: files[sha256].read_text(encoding="utf-8") for name, sha256 in one.files.items()
+        } | one.given
+        for name, said in contents.items():
+            (here / "files" / name).write_text(said, encoding="utf-8")
+            lines += said.splitlines()
         words = (f"{NAME}.v2", path.name, "values.lc")
-        checked = checks(here, words)
-        there, error = ran([here / word for word in words], given, here / "run.mcap", one.limit)
-    whole = Text("\n".join([text, one.values, wrapped(one.program, one.prelude)]), True, path.stem.lower())
+        checked = checks(here, words, dialect)
+        there, error = ran([here / word for word in words], here / "files", here / "run.mcap", one.limit, dialect)
+    whole = Text(
+        "\n".join([text, one.values, wrapped(one.program, one.prelude)]), bool(one.repository), path.stem.lower()
+    )
     return judged(one, whole, lines, there, checked, error)
 
 
-def checks(here: Path, words: Sequence[str]) -> list[Mapping[str, Any]]:
+def checks(here: Path, words: Sequence[str], dialect: str) -> list[Mapping[str, Any]]:
     """The errors that `vrs check` finds."""
     done = subprocess.run(
-        [sys.executable, "-m", "interfaces.cli", "check", *words, "--program", NAME, *OPTIONS, "--json"],
+        [sys.executable, "-m", "interfaces.cli", "check", *words, "--program", NAME, "--dialect", dialect,
+         "--files", "files", "--json"],
         capture_output=True, text=True, cwd=here, check=False,
     )  # fmt: skip
     if not done.stdout:
@@ -152,17 +170,15 @@ def checks(here: Path, words: Sequence[str]) -> list[Mapping[str, Any]]:
     return [row for row in rows if row["severity"] == "error"]
 
 
-OPTIONS = ("--dialect", "vplus", "--files", "files")
-
-
-def ran(paths: Sequence[Path], files: Path, recording: Path, limit: float) -> tuple[list[Joints], ValError | None]:
+def ran(
+    paths: Sequence[Path], files: Path, recording: Path, limit: float, dialect: str
+) -> tuple[list[Joints], ValError | None]:
     """Where the arm stood, and what the program ended with: as `vrs run` has it, with an ideal body."""
     from interfaces.cli.options import dialect_of
 
     recorder = RunRecorder(recording)
-    vplus = dialect_of("vplus")
     try:
-        source = joined([read_program(path, vplus) for path in paths], NAME)
+        source = joined([read_program(path, dialect_of(dialect)) for path in paths], NAME)
         played = play(
             source, load("puma560"), delay_profile("none"),
             seed=1, arm=exact_arm, limit=limit, files=files, keeper=recorder,
@@ -204,7 +220,8 @@ def judged(
     texts = [row for row in checked if row["what"] not in OUT_OF_REACH]
     full = n == len(wanted) and len(texts) == len(checked)
     if n > len(wanted) or way > WAY or turn > TURN:
-        verdict, reason = WRONG, f"{n} motions, the evaluation has {len(wanted)} {unforeseen}".rstrip()
+        many = f"{n} motions, the evaluation has {len(wanted)} {unforeseen}".rstrip()
+        verdict, reason = WRONG, many if n > len(wanted) else "it stood elsewhere"
     elif (error is None or error.what == GIVEN_UP) and full:
         verdict, reason = RIGHT if n else STILL, "it has no end, and is given up" if error else ""
     elif error is None or error.what == GIVEN_UP:
@@ -237,7 +254,7 @@ def table(findings: Sequence[Finding]) -> str:
     for one in findings:
         off = (f"{one.way:.6f}", f"{one.turn:.6f}") if one.destinations else ("", "")
         reason = one.reason.replace("|", r"\|")
-        name = f"`{one.repository}` `{one.path}`: `{one.program}`"
+        name = " ".join([f"`{one.repository}`"] * bool(one.repository) + [f"`{one.path}`: `{one.program}`"])
         rows.append(f"| {name} | {one.destinations or ''} | {off[0]} | {off[1]} | {one.verdict} | {reason} |")
     return "\n".join(["", *rows, "", ""])
 
@@ -272,7 +289,8 @@ def main(words: Sequence[str]) -> int:
     )
     parser.add_argument("--write", action="store_true", help=f"write {FOUND.name} and the table in {PAGE.name}")
     asked = parser.parse_args(words)
-    files = {digest(file): file for file in sorted(asked.directory.rglob("*")) if file.is_file()}
+    found = sorted(file for file in asked.directory.rglob("*") if file.is_file())
+    files = {digest(file): file for file in [*found, *ours()]}
     findings = []
     for one in known():
         if asked.only and not any(name in f"{one.path} {one.program}" for name in asked.only):
