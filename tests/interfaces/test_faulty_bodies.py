@@ -15,7 +15,7 @@ from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots.onboard import FollowingAbort, SensorFault, StopReason, WatchdogConfig, WatchdogState
 from robots.robot import ExactArm, Prepared
 from tests.interfaces.test_host import READY, STEP, Ends, to

@@ -34,7 +34,7 @@ from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSiteConfig
-from interfaces.teleop.halt import Halt, HaltCause, text_of
+from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard import LossPolicy
