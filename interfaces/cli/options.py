@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from robots.robot import FOUND, HeadCamera, load
+from robots.robot import FOUND, USUAL, HeadCamera, load
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -80,6 +80,15 @@ VAL_JOINTS = 6
 RobotName: TypeAlias = Annotated[
     str,
     option("--robot NAME|MODULE:NAME", f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own."),
+]
+RobotNames: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME|MODULE:NAME",
+        help=f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own; repeated, several in one "
+        f"world. Unless given, {USUAL}.",
+    ),
 ]
 RecordedRobot: TypeAlias = Annotated[
     str | None, option("--robot NAME|MODULE:NAME", "The robot that it's of, unless its name is known.")
@@ -193,20 +202,27 @@ OF_SITES: Final = (
 """The same of robots that have a site, as thin clients haven't."""
 
 
-def check_taken(robot: Robot, ctx: typer.Context) -> None:
-    """Check that no option was given that a robot has nothing of.
+def check_taken(robots: Sequence[Robot], ctx: typer.Context) -> None:
+    """Check that no option was given that none of some robots has anything of.
 
     Args:
-        robot: The robot.
+        robots: The robots.
         ctx: Of the command.
 
     Raises:
         InvalidValueError: If one was.
     """
+    names = ", ".join(robot.name for robot in robots)
+    said = f"{names} {'has' if len(robots) == 1 else 'have'} nothing of the kind"
+    left_out(ctx, said, [option for option in untaken(robots[0]) if all(option in untaken(r) for r in robots)])
+
+
+def untaken(robot: Robot) -> tuple[str, ...]:
+    """Options that a robot has nothing of."""
     others = OF_ARMS if robot.is_base else OF_BASES
     val = () if speaks_val(robot) else OF_VAL
     cameras = () if robot.device(HeadCamera) else OF_CAMERAS
-    left_out(ctx, f"{robot.name} has nothing of the kind", (*others, *val, *cameras))
+    return *others, *val, *cameras
 
 
 def left_out(ctx: typer.Context, why: str, options: Iterable[str]) -> None:

@@ -203,7 +203,7 @@ def robot(
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
     chosen = load(name)
-    check_taken(chosen, ctx)
+    check_taken([chosen], ctx)
     address = parse_address("--listen", listen)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     beat = 1.0 / number_in("reports", reports, 1.0, 200.0, unit=" a second")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import quote
 
 import typer
 
@@ -22,7 +24,7 @@ from interfaces.cli.options import (
     OperatorLossName,
     Port,
     ReachedAs,
-    RobotName,
+    RobotNames,
     RoomName,
     TokenFile,
     abandon,
@@ -40,6 +42,7 @@ from interfaces.cli.options import (
     say_robot,
     speaks_val,
     start_robot,
+    untaken,
 )
 from interfaces.system import software
 from robots.robot import USUAL, HeadCamera, load
@@ -47,6 +50,7 @@ from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    import asyncio
     from contextlib import AbstractAsyncContextManager
 
     from interfaces.link import LinkConditions
@@ -57,13 +61,14 @@ if TYPE_CHECKING:
     from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
+    from vrs.clock import Clock
 
 
 def serve(
     ctx: typer.Context,
     host: Host = "127.0.0.1",
     port: Port = 8600,
-    name: RobotName = USUAL,
+    names: RobotNames = None,
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     camera: Annotated[
@@ -137,10 +142,16 @@ def serve(
     from interfaces.teleop.architectures import architecture as makes
     from robots.onboard.watchdog import LossPolicy
 
-    robot = load(name)
+    names = names or [USUAL]
+    robots = [load(name) for name in names]
+    if len({robot.name for robot in robots}) < len(robots):
+        raise InvalidValueError("robot", ", ".join(names), "each robot once")
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    robot.body(body)
+    for robot in robots:
+        robot.body("" if "body" in untaken(robot) else body)
+    if len(robots) > 1:
+        left_out(ctx, "of several robots each is started here", ("robot-at", "robot-token-file"))
     if robot_at is not None:
         its_own = "offset", "max-age", "body", "operator-loss", "architecture"
         left_out(ctx, "the robot at --robot-at has its own", its_own)
@@ -158,9 +169,9 @@ def serve(
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
     allowed = asked_for(host, reached_as or ())
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
-    check_taken(robot, ctx)
+    check_taken(robots, ctx)
     place = room_of(room)
-    if robot.is_base:
+    if any(robot.is_base for robot in robots):
         if jobs.exists() and not jobs.is_file():
             raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
         makes(architecture)
@@ -170,40 +181,50 @@ def serve(
     behind = spelled(fixed_offset(offset, profile))
     if recordings.exists() and not recordings.is_dir():
         raise InvalidValueError("recordings", str(recordings), "a directory, or one that can be made")
-    if record is not None and record.is_file():
-        raise InvalidValueError("record", str(record), "a file that isn't there yet: none is written over")
+    records = [None if record is None else _own(record, k, robot) for k, robot in enumerate(robots)]
+    for path in records:
+        if path is not None and path.is_file():
+            raise InvalidValueError("record", str(path), "a file that isn't there yet: none is written over")
     if not val_files.is_dir():
         raise InvalidValueError("val-files", str(val_files), "a directory")
-    if record is not None:
-        # Before a robot is started.
-        Sink.create(record).close()
+    for path in records:
+        if path is not None:
+            # Before a robot is started.
+            Sink.create(path).close()
     if advice:
         typer.echo(f"vrs: {advice}", err=True)
-    options = [
-        "--robot", name, "--offset", behind, "--max-age", f"{max_age:g}", "--body", body, "--room", room,
-        "--architecture", architecture, "--operator-loss", operator_loss,
-    ]  # fmt: skip
-    if record is not None and not robot.is_base:
-        options += ["--reports", f"{RATE:g}"]
+    given = {
+        "offset": behind, "max-age": f"{max_age:g}", "body": body, "room": room, "architecture": architecture,
+        "operator-loss": operator_loss,
+    }  # fmt: skip
     access = access_for(host, token_file, free=OPEN)
-    port_of_val, files_of_val = (val_port, val_files) if speaks_val(robot) else (None, None)
-    eye = camera if robot.device(HeadCamera) else 0.0
-    serving = _Serving(
-        robot, host, port, allowed, link, seed, policy, at, token, tuple(options), until_eof, place, jobs, eye,
-        port_of_val, files_of_val, record, recordings, behind, architecture,
-    )  # fmt: skip
-    uvloop.run(_serve(serving, access))
+    serving = []
+    for k, (robot, name, path) in enumerate(zip(robots, names, records, strict=True)):
+        kept = {option: value for option, value in given.items() if option not in untaken(robot)}
+        if record is not None and not robot.is_base:
+            kept["reports"] = f"{RATE:g}"
+        options = ["--robot", name, *(word for option, value in kept.items() for word in (f"--{option}", value))]
+        port_of_val, files_of_val, val_port = (
+            (val_port, val_files, None) if speaks_val(robot) else (None, None, val_port)
+        )
+        eye = camera if robot.device(HeadCamera) else 0.0
+        serving.append(_Serving(
+            robot, link, seed + k, policy, at, token, tuple(options), place, _own(jobs, k, robot), eye,
+            port_of_val, files_of_val, path, recordings, behind, architecture, f"/robots/{quote(robot.name, safe='')}" if k else "",
+        ))  # fmt: skip
+    uvloop.run(_serve(serving, access, host, port, allowed, until_eof=until_eof))
+
+
+def _own(path: Path, k: int, robot: Robot) -> Path:
+    """The file of the k-th robot: what was asked for is the first one's."""
+    return path.with_stem(f"{path.stem}-{robot.name}") if k else path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Serving:
-    """What is served, where, and how the robot is reached."""
+    """What is served of a robot, and how it's reached."""
 
     robot: Robot
-    host: str
-    port: int
-    allowed: Hosts
-    """What requests may ask for."""
     conditions: LinkConditions
     seed: int
     link_loss: LossPolicy | None
@@ -213,7 +234,6 @@ class _Serving:
     robot_token: str | None = field(repr=False)
     options: tuple[str, ...]
     """Of the robot that is started."""
-    until_eof: bool
     room: Room
     """Where a mobile robot drives."""
     jobs: Path
@@ -232,6 +252,8 @@ class _Serving:
     """Of the robot that is started: how far it plays behind."""
     architecture: str
     """Of a mobile robot that is started: what it does with the operator's path."""
+    folder: str
+    """Below which its page and sockets are; empty for the server's first robot."""
 
     def recording(self, path: Path, *, over: bool = True) -> LiveRecording:
         """What is recorded into a file, which may be written over."""
@@ -250,8 +272,10 @@ class _Serving:
         )
 
 
-async def _serve(serving: _Serving, access: Access) -> None:
-    """Run until a signal comes. The page is there before the robot is."""
+async def _serve(
+    serving: Sequence[_Serving], access: Access, host: str, port: int, allowed: Hosts, *, until_eof: bool
+) -> None:
+    """Run until a signal comes. The page is there before the robots are."""
     import asyncio
     import contextlib
 
@@ -260,20 +284,25 @@ async def _serve(serving: _Serving, access: Access) -> None:
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    served, host, val_files = serving.robot, serving.host, serving.val_files
     async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
-        listening = stack.enter_context(contextlib.closing(sockets.bind(host, serving.port)))
-        port = listening.getsockname()[1]
-        shown = Address(host, port)
+        listening = stack.enter_context(contextlib.closing(sockets.bind(host, port)))
+        shown = Address(host, listening.getsockname()[1])
         val_listening = None
-        if serving.val_port is not None:
-            val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", serving.val_port)))
-        lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        robot = asyncio.create_task(start_robot(robots, serving.robot_at, serving.options, lost.set_result))
-        stack.push_async_callback(abandon, robot)
+        for one in serving:
+            if one.val_port is not None:
+                val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", one.val_port)))
+        starting = []
+        for one in serving:
+            lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+            robot = asyncio.create_task(start_robot(robots, one.robot_at, one.options, lost.set_result))
+            stack.push_async_callback(abandon, robot)
+            starting.append((robot, lost))
         await asyncio.to_thread(_load)
 
+        from starlette.routing import BaseRoute, Mount
+
         from interfaces.messages.control import Role
+        from interfaces.runtime.live.operator import share_world
         from interfaces.runtime.live.twins import ArmTwins
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
@@ -284,48 +313,74 @@ async def _serve(serving: _Serving, access: Access) -> None:
         from interfaces.val2.rooms import HOST, served_room
         from interfaces.val2.tcp import TcpTerminalServer
         from robots.onboard.lease import LeaseState
+        from vrs.clock import WallClock
 
-        operator = _operator(serving, access)
-        lost.add_done_callback(partial(say_lost, operator.lose))
-        station = _station(serving)
-        shelf, what = Shelf(serving.recordings, served), partial(serving.recording, over=False)
-        recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
-        routes = [*operator.routes, *recordings.routes]
-        parts: list[AbstractAsyncContextManager[object]] = [operator.running(), recordings.running()]
-        if val_files is not None:
-            assert isinstance(operator.twins, ArmTwins)
-            client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
-            room = served_room(client, operator.twins.operator, val_files, software())
-            routes.append(PageTerminalServer(room, access).route)
-        app = application([*routes, *station.routes], serving.allowed(port))
+        clock = WallClock()
+        operators = [_operator(one, access, clock) for one in serving]
+        if len(serving) > 1:
+            await asyncio.to_thread(share_world, operators)
+        first: list[BaseRoute] = []
+        others: list[BaseRoute] = []
+        parts: list[AbstractAsyncContextManager[object]] = []
+        for one, operator, (_, lost) in zip(serving, operators, starting, strict=True):
+            lost.add_done_callback(partial(say_lost, operator.lose))
+            shelf, what = Shelf(one.recordings, one.robot), partial(one.recording, over=False)
+            recordings = Recordings(operator.recording, operator.clock, shelf, access, what)
+            routes = [*operator.routes, *recordings.routes]
+            parts += operator.running(), recordings.running()
+            if one.val_files is not None:
+                assert isinstance(operator.twins, ArmTwins)
+                client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
+                room = served_room(client, operator.twins.operator, one.val_files, software())
+                routes.append(PageTerminalServer(room, access).route)
+                if one.val_port is not None:
+                    val_room = room
+            routes += _station(one, serving).routes
+            if one.folder:
+                others.append(Mount(one.folder, routes=routes))
+            else:
+                first = routes
+        app = application([*others, *first], allowed(shown.port))
         for part in (sockets.serve(app, listening), *parts):
             await stack.enter_async_context(part)
         keep_quiet()
-        tidying = asyncio.create_task(collect_at_leisure(lambda: operator.hub.lease_state is LeaseState.FREE))
+        tidying = asyncio.create_task(
+            collect_at_leisure(lambda: all(operator.hub.lease_state is LeaseState.FREE for operator in operators))
+        )
         stack.callback(tidying.cancel)
-        typer.echo(f"vrs: serving {served.name} on http://{shown}/view (programs: ws://{shown}/ws)")
-        typer.echo(f"vrs: operator station on http://{shown}/")
+        for one in serving:
+            at = f"{shown}{one.folder}"
+            typer.echo(f"vrs: serving {one.robot.name} on http://{at}/view (programs: ws://{at}/ws)")
+            typer.echo(f"vrs: operator station on http://{at}/")
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
-            await room.ready()
-            val_door = TcpTerminalServer(room, val_access)
+            await val_room.ready()
+            val_door = TcpTerminalServer(val_room, val_access)
             await stack.enter_async_context(val_door.listening(val_listening))
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:
                 typer.echo(f"vrs: VAL-II asks each terminal for a token, the first line to send: {val_token}")
         sys.stdout.flush()
-        if serving.until_eof:
+        if until_eof:
             end_with_input(ended)
         ending = asyncio.create_task(ended.wait())
-        await asyncio.wait([robot, ending], return_when=asyncio.FIRST_COMPLETED)
-        if robot.done():
-            operator.robot.url = robot.result()
-            say_robot(robot.result(), serving.conditions, serving.link_loss)
+        met = asyncio.gather(*map(_meet, serving, operators, (robot for robot, _ in starting)))
+        stack.callback(met.cancel)
+        waiting: list[asyncio.Future[Any]] = [met, ending]
+        await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        if met.done():
+            met.result()
         await ending
 
 
-def _operator(serving: _Serving, access: Access) -> LiveOperator:
+async def _meet(serving: _Serving, operator: LiveOperator, robot: asyncio.Task[str]) -> None:
+    """Let an operator's site find its robot, once that's there."""
+    operator.robot.url = await robot
+    say_robot(operator.robot.url, serving.conditions, serving.link_loss)
+
+
+def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
     """Make the operator's site."""
     from interfaces.jobs import JobFile
     from interfaces.media import CameraConfig
@@ -339,11 +394,11 @@ def _operator(serving: _Serving, access: Access) -> LiveOperator:
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
     )  # fmt: skip
-    return LiveOperator(config, access)
+    return LiveOperator(config, access, clock=clock)
 
 
-def _station(serving: _Serving) -> Station:
-    """Make the page."""
+def _station(serving: _Serving, all_served: Sequence[_Serving]) -> Station:
+    """Make a robot's page."""
     from interfaces.station.chain import described
     from interfaces.station.page import Station
     from interfaces.station.panels import Offer, panels_of
@@ -352,7 +407,8 @@ def _station(serving: _Serving) -> Station:
     offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
     offers |= {Offer.CAMERA} if serving.camera else set()
     offers |= {Offer.TERMINALS} if serving.val_files is not None else set()
-    return Station(described(robot), panels_of(offers))
+    pages = [(one.robot.name, f"{one.folder}/", one is serving) for one in all_served]
+    return Station(described(robot), panels_of(offers), pages if len(pages) > 1 else ())
 
 
 def _load() -> None:

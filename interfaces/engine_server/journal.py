@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from interfaces.messages import Change, History, Order, Outcome, RefusalCode
-from interfaces.messages.commands import portable
 from interfaces.messages.fields import MOST_NAMES
+from interfaces.messages.requests import portable
 from vrs.commands import Command
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError, VrsError

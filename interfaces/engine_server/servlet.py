@@ -31,8 +31,8 @@ from interfaces.messages import (
     ViewForm,
     Want,
 )
-from interfaces.messages.commands import portable
 from interfaces.messages.fields import MOST_NAMES
+from interfaces.messages.requests import portable
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError
 from vrs.model import frozen_array

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypeAlias
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypeAlias, get_args
 
 import msgspec
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.messages.commands import check_command
 from interfaces.messages.fields import (
     CommandId,
     Count,
@@ -30,6 +30,10 @@ from interfaces.messages.fields import (
     Text,
     Time,
     Word,
+    check_normal,
+    cut,
+    plain,
+    rich,
 )
 from interfaces.messages.segments import Dof, Segmented, Segments
 from vrs.checks import finite
@@ -50,6 +54,50 @@ else:
 
 LONGEST_DELAY: Final = 0.1
 """Compact frames wait no longer for others that go in the same message [s]."""
+
+
+_KINDS: tuple[type, ...] = get_args(Command)
+_encode = msgspec.msgpack.Encoder(enc_hook=plain).encode
+
+
+def check_command(command: object) -> None:
+    """Check that it's a command.
+
+    Raises:
+        InvalidValueError: If it isn't.
+    """
+    if not isinstance(command, _KINDS):
+        raise InvalidValueError("command", command, f"one of {', '.join(kind.__name__ for kind in _KINDS)}")
+
+
+def portable(receipt: Receipt, most: int | None = None) -> Receipt:
+    """Return a receipt that holds nothing of the engine: names found, texts as long as they're read.
+
+    Args:
+        receipt: As an engine gave it.
+        most: Names of each kind, the first ones; None for all.
+    """
+    found: Receipt = cut(receipt.named(most))
+    return found
+
+
+def check_crosses(command: Command) -> None:
+    """Check that whoever gets a command over a connection can read it.
+
+    Raises:
+        InvalidValueError: If it can't be written, or a reader would refuse it.
+    """
+    check_command(command)
+    try:
+        data = _encode(command)
+        check_normal(msgspec.msgpack.decode(data), _reader()(data), "command")
+    except (msgspec.MsgspecError, OverflowError, TypeError) as error:
+        raise InvalidValueError("command", command, f"one that can cross a connection: {error}") from None
+
+
+@cache
+def _reader() -> Callable[[bytes], Command]:
+    return msgspec.msgpack.Decoder(Command, dec_hook=rich).decode
 
 
 class FrameStatus(enum.StrEnum):

@@ -16,7 +16,6 @@ import numpy as np
 from typing_extensions import override
 
 from interfaces.link import PacketRecord
-from interfaces.messages.commands import portable
 from interfaces.messages.fields import text
 from interfaces.messages.recording import (
     Anchor,
@@ -33,6 +32,7 @@ from interfaces.messages.recording import (
     RunEvent,
     Site,
 )
+from interfaces.messages.requests import portable
 from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
 from interfaces.recording.history import AnyTimeline, edit_entries, whole_entries

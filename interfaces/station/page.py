@@ -45,14 +45,17 @@ def _file(name: str) -> KeptFile:
 class Station:
     """The page `/` of a robot, and the files below `/station/`."""
 
-    def __init__(self, robot: Mapping[str, Any], panels: Sequence[Panel]) -> None:
+    def __init__(
+        self, robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]] = ()
+    ) -> None:
         """Make the page.
 
         Args:
             robot: What the panels' scripts are told of it, see `chain.described`.
             panels: What the page has, see `panels_of`.
+            robots: Where the server has several, of each its name, where its page is, and whether that's this one.
         """
-        self._page = KeptFile.of(_page(robot, panels).encode())
+        self._page = KeptFile.of(_page(robot, panels, robots).encode())
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -63,7 +66,7 @@ class Station:
         return self._page.answer(request, "text/html", HEADERS)
 
 
-def _page(robot: Mapping[str, Any], panels: Sequence[Panel]) -> str:
+def _page(robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]]) -> str:
     """Its HTML: the empty boxes that the panels' scripts fill, and what those are told."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -72,4 +75,4 @@ def _page(robot: Mapping[str, Any], panels: Sequence[Panel]) -> str:
     )
     listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in panels]
     config = json.dumps({"robot": robot, "panels": listed})
-    return templates.get_template("index.html").render(panels=panels, config=config)
+    return templates.get_template("index.html").render(panels=panels, config=config, robots=robots)

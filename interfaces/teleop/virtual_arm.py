@@ -13,13 +13,21 @@ from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
 from interfaces.messages import Refusal
-from interfaces.messages.commands import check_crosses
 from interfaces.messages.fields import Epoch
 from interfaces.messages.recording import CommandRecord
+from interfaces.messages.requests import check_crosses
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
 from interfaces.teleop.connection import SiteLine
-from interfaces.teleop.halt import Halt, HaltCause, not_following, text_of
-from interfaces.teleop.operator import Correction, OperatorSite, SiteObserver, VirtualRobot
+from interfaces.teleop.operator import (
+    Correction,
+    Halt,
+    HaltCause,
+    OperatorSite,
+    SiteObserver,
+    VirtualRobot,
+    not_following,
+    text_of,
+)
 from interfaces.teleop.samples import Gathering
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock

@@ -20,8 +20,7 @@ from interfaces.messages.sites import ArcPacket, DriveOrders, DriveReport, Sampl
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.deviation import Deviation, PathDeviation
-from interfaces.teleop.halt import Halt, HaltCause, not_following
-from interfaces.teleop.operator import Correction, OperatorSite, VirtualRobot
+from interfaces.teleop.operator import Correction, Halt, HaltCause, OperatorSite, VirtualRobot, not_following
 from robots.onboard.driving import STAND, Drive, Posture, is_still
 from vrs.checks import finite, normal
 from vrs.commands import DriveCommand, Stop

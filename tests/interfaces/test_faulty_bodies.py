@@ -15,7 +15,7 @@ from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import Moved
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop import JointReference, RobotSiteConfig
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots.onboard.following import FollowingAbort, SensorFault
 from robots.onboard.watchdog import StopReason, WatchdogConfig, WatchdogState
 from robots.robot import ExactArm, Prepared

@@ -13,7 +13,7 @@ from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
 from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine, VirtualArm
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots.robot import ExactArm
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, TICK
 from vrs import JointTarget, MotionCommand

@@ -10,7 +10,7 @@ import pytest
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.sites import Orders
 from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig, VirtualArm
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots import puma560
 from robots.onboard.watchdog import LossPolicy, WatchdogConfig
 from vrs import JointTarget, MotionCommand, SteerCommand

@@ -9,8 +9,7 @@ from interfaces.engine_server.servlet import Servlet
 from interfaces.messages import Order, Outcome, Refusal, RefusalCode
 from interfaces.messages.fields import MOST_NAMES
 from interfaces.stream import Encoding, decode, encode
-from interfaces.teleop.halt import Halt, HaltCause
-from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.operator import Halt, HaltCause, OperatorSite
 from interfaces.teleop.virtual_arm import VirtualArm
 from tests.interfaces.joined import MODEL, to
 from vrs import Engine, Insertion, ManualClock, PositionQuery

@@ -24,7 +24,7 @@ from interfaces.messages.jobs import (
 from interfaces.runtime.live.base_twins import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.task_desk import TOO_LONG, TaskDesk
 from interfaces.stream.codec import News
-from interfaces.teleop.halt import HaltCause
+from interfaces.teleop.operator import HaltCause
 from robots.bullet.rooms import Place, Room
 from robots.onboard.journey import Goal
 from tests.interfaces.teleop.rig import MODEL, Rig

@@ -13,7 +13,7 @@ from interfaces.messages.sites import LogEntry, Orders
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from interfaces.teleop.following_arm import ReceivedLog
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots import puma560
 from robots.onboard.watchdog import WatchdogConfig
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand, Stop

@@ -5,7 +5,7 @@ from __future__ import annotations
 from interfaces.engine_server.site import Site
 from interfaces.messages import Order
 from interfaces.teleop import OperatorSite, VirtualArm
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots import puma560
 from vrs import JointTarget, MotionCommand
 from vrs.commands import Cancel

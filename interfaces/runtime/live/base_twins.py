@@ -20,8 +20,7 @@ from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.scene import PIECE
 from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
-from interfaces.teleop.halt import Halt, HaltCause
-from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.operator import Halt, HaltCause, OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import secrets
-from collections.abc import AsyncIterator, Callable, Hashable
+from collections.abc import AsyncIterator, Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 from starlette.routing import BaseRoute
 from typing_extensions import override
 
@@ -32,18 +34,20 @@ from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSiteConfig
-from interfaces.teleop.halt import Halt, HaltCause, text_of
+from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
-from vrs.clock import WallClock, seconds_since_1970
+from vrs.clock import Clock, WallClock, seconds_since_1970
 from vrs.errors import VrsError
 from vrs.model import Array
 
 SHOW = 1.0 / 60.0
 """Time between two frames of the view [s]."""
+APART = 1.5
+"""Arms in one world stand so far to the left of where mobile robots begin, and of each other [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,12 +90,13 @@ class LiveOperatorConfig:
 class LiveOperator(LeasedRobot, Workers):
     """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
 
-    def __init__(self, config: LiveOperatorConfig, access: Access) -> None:
-        """Session time begins here.
+    def __init__(self, config: LiveOperatorConfig, access: Access, *, clock: Clock | None = None) -> None:
+        """Session time begins here, unless another robot's site began it.
 
         Args:
             config: The site.
             access: Who may do what.
+            clock: Session time, where several sites share it.
 
         Raises:
             RecordingError: If it's to be recorded and the file can't be made.
@@ -104,7 +109,7 @@ class LiveOperator(LeasedRobot, Workers):
             twins = ArmTwins(
                 which, config.conditions, config.seed, q=config.q, config=config.site, rates=config.rates
             )
-        self.clock = WallClock()
+        self.clock = WallClock() if clock is None else clock
         self.twins, self.operator, self.line, self.scene = twins, twins.operator, twins.line, twins.scene
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
@@ -268,3 +273,24 @@ class LiveOperator(LeasedRobot, Workers):
             "timer_late": self._turning.lateness.worst,
             **{device.name: device.health() for device in self.devices},
         }
+
+
+def share_world(sites: Sequence[LiveOperator]) -> None:
+    """Let each robot be seen in the scenes of the others, where it stands in one world; before any site runs.
+
+    Mobile robots are where their room has them. Arms stand in a row to the left of where those begin, `APART` from
+    each other, their feet on the floor. It takes a moment.
+    """
+    places, arms = [], 0
+    for site in sites:
+        X = np.eye(4)
+        if not site.config.which.is_base:
+            arms += 1
+            x, y, theta = site.config.room.start
+            aside = arms * APART
+            X[:3, 3] = x - aside * math.sin(theta), y + aside * math.cos(theta), -bodies(site.config.which)[1]
+        places.append(X)
+    for site, X_WA in zip(sites, places, strict=True):
+        for other, X_WB in zip(sites, places, strict=True):
+            if other is not site:
+                other.scene.show_in(site.scene, other.config.which.name, np.linalg.inv(X_WA) @ X_WB)

@@ -30,8 +30,7 @@ from interfaces.messages.jobs import (
 )
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.stream.codec import News
-from interfaces.teleop.halt import HaltCause
-from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.operator import HaltCause, OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
 from robots.bullet.rooms import Room

@@ -19,8 +19,7 @@ from interfaces.runtime.live.process import warm
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine, VirtualArm
 from interfaces.teleop.connection import SiteLine
-from interfaces.teleop.halt import Halt, HaltCause, text_of
-from interfaces.teleop.operator import VirtualRobot
+from interfaces.teleop.operator import Halt, HaltCause, VirtualRobot, text_of
 from robots.robot import Robot
 from vrs.model import Array, home
 

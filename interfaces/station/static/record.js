@@ -78,7 +78,7 @@ export function mount(station, box) {
     busy = true;
     showState();
     try {
-      const answer = await fetch("/recordings", { method: "POST", headers, body: JSON.stringify(request) });
+      const answer = await fetch(window.VrsLink.FOLDER + "/recordings", { method: "POST", headers, body: JSON.stringify(request) });
       const found = await answer.json();
       complain(found.problem ?? "");
       return answer.ok ? found : null;
@@ -107,7 +107,7 @@ export function mount(station, box) {
 
   async function copy(item) {
     const found = await ask({ do: "copy", name: item.name });
-    if (found) h("a", { href: found.path, download: item.name }).click();
+    if (found) h("a", { href: window.VrsLink.FOLDER + found.path, download: item.name }).click();
   }
 
   let told = "";
@@ -172,7 +172,7 @@ export function mount(station, box) {
       query.set("b", chosen[1]);
       query.set("align", align.value);
     }
-    mark(open, "href", "/replay?" + query);
+    mark(open, "href", window.VrsLink.FOLDER + "/replay?" + query);
   }
 
   let drawn = "";

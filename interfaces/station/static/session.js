@@ -97,7 +97,7 @@ export class Session extends EventTarget {
     this.heard = seconds();
     this.greeted = false;
     this.connected = true;
-    this.wire.connect(scheme + location.host + "/ws");
+    this.wire.connect(scheme + location.host + window.VrsLink.FOLDER + "/ws");
   }
 
   greet() {

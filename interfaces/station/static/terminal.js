@@ -109,7 +109,7 @@ export function mount(station, box) {
     say("Connecting …");
     shown = told = 0;
     outgoing = [];
-    const mine = new WebSocket(location.origin.replace(/^http/, "ws") + "/val");
+    const mine = new WebSocket(location.origin.replace(/^http/, "ws") + window.VrsLink.FOLDER + "/val");
     socket = mine;
     mine.onopen = () => {
       who = "";

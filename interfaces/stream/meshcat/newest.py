@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import msgspec
+from typing_extensions import override
 
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -150,10 +151,43 @@ class Nodes(Newest):
     def __init__(self) -> None:
         """Begin with nothing to be seen."""
         super().__init__(_encoder.encode({"type": "delete", "path": ROOT}))
+        self._others: list[tuple[Nodes, str]] = []
+        """Scenes in which this one's robots are seen, too, and the node there below which they are."""
+
+    def show_in(self, other: Nodes, name: str, X: Array) -> None:
+        """Let what stands below `ROOT` from now on be seen in another scene, too.
+
+        Args:
+            other: That scene.
+            name: What this is called there.
+            X: Where this scene's frame is in that one's, (4, 4).
+        """
+        root = f"/beside/{name}"
+        self._others.append((other, root))
+        other.put_transform(root, X)
+
+    @property
+    @override
+    def readers(self) -> int:
+        return super().readers + sum(super(Nodes, other).readers for other, _ in self._others)
+
+    @override
+    def wake(self) -> None:
+        super().wake()
+        for other, _ in self._others:
+            super(Nodes, other).wake()
+
+    def _seen_at(self, path: str) -> Iterator[tuple[Nodes, str]]:
+        """Where else a node is seen; what is said of the scene as a whole is its own."""
+        if path.startswith(f"{ROOT}/"):
+            for other, root in self._others:
+                yield other, root + path[len(ROOT) :]
 
     def put_transform(self, path: str, X: Array) -> None:
         """Put a node at X, (4, 4), in its parent's frame."""
         self.put(path, set_transform(path, X))
+        for other, where in self._seen_at(path):
+            other.put_transform(where, X)
 
     def put_object(self, path: str, lowered: Json) -> None:
         """Show an object at a node, in place of the one that's there.
@@ -163,8 +197,12 @@ class Nodes(Newest):
             lowered: The object as MeshCat's classes lower it: `geometries`, `materials`, `object`.
         """
         self.put(f"{path} object", _encoder.encode({"type": "set_object", "object": lowered, "path": path}))
+        for other, where in self._seen_at(path):
+            other.put_object(where, lowered)
 
     def put_property(self, path: str, name: str, value: Any) -> None:
         """Set a property of a node; the viewer keeps those that it doesn't know with the node."""
         command = {"type": "set_property", "path": path, "property": name, "value": value}
         self.put(f"{path} {name}", _encoder.encode(command))
+        for other, where in self._seen_at(path):
+            other.put_property(where, name, value)

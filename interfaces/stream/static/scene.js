@@ -18,7 +18,7 @@ window.VrsLink = class {
 
   connect() {
     this.again = null;
-    const url = (location.protocol === "https:" ? "wss://" : "ws://") + location.host + this.path;
+    const url = (location.protocol === "https:" ? "wss://" : "ws://") + location.host + VrsLink.FOLDER + this.path;
     const mine = (this.socket = new WebSocket(url, this.protocols));
     mine.binaryType = "arraybuffer";
     this.heard = performance.now();
@@ -69,6 +69,7 @@ window.VrsLink = class {
 VrsLink.BEAT = 2000; // [ms] between two questions whether the server is there
 VrsLink.PATIENCE = 6000; // [ms] without an answer after which the connection counts as lost
 VrsLink.UNAUTHORISED = 4401;
+VrsLink.FOLDER = location.pathname.replace(/\/[^/]*$/, ""); // of the page: one below /robots/NAME/ is that robot's
 
 // Lights that a scene drawn by software does without: each costs time at every pixel.
 const SIDE_LIGHTS = ["PointLightNegativeX", "PointLightPositiveX"];

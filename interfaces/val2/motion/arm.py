@@ -16,7 +16,7 @@ import numpy as np
 
 from interfaces.clients.designer import Issued
 from interfaces.messages import RefusalCode
-from interfaces.teleop.halt import NOT_FOLLOWING
+from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.places import (

@@ -12,8 +12,7 @@ from typing_extensions import override
 
 from interfaces.clients.designer import Issued
 from interfaces.messages import Refusal, RefusalCode
-from interfaces.teleop.halt import text_of
-from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.operator import OperatorSite, text_of
 from interfaces.teleop.virtual_arm import VirtualArm
 from vrs.clock import ManualClock
 from vrs.commands import Command

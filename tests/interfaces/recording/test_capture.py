@@ -23,7 +23,7 @@ from interfaces.runs.twin_run import Turn
 from interfaces.runtime.plan import parse_plan
 from interfaces.runtime.session import run_twins
 from interfaces.teleop import OperatorSite, VirtualArm
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots.robot import exact_arm
 from tests.interfaces.recording import recorded, shown
 from tests.interfaces.recording.taken import MODEL, NOMINAL, PLAN, ROBOT, Sitting, taken

@@ -60,7 +60,7 @@ def test_what_is_driven_is_looked_back_at_while_it_is_recorded(browser: Any, tmp
         page.open()
         page.wait("Boolean(station.session.state.real)")
         page.take_control()
-        start = postures(page)
+        start, began = postures(page), page.get("station.session.state.now")
         page.page.keyboard.down("ArrowUp")
         page.until(lambda: min(gone(page, start)) > 0.4)
         page.page.keyboard.up("ArrowUp")
@@ -80,7 +80,7 @@ def test_what_is_driven_is_looked_back_at_while_it_is_recorded(browser: Any, tmp
         shown.keyboard.press("Space")
         until(lambda: shown.evaluate("replay.state.mode === 'paused'"))
         seen = {}
-        for t in (rested - 1.0, 0.5 * rested, rested):
+        for t in (0.25 * began + 0.75 * rested, 0.5 * (began + rested), rested):
             shown.evaluate("t => replay.wish('seek', { t })", t)
             until(lambda t=t: abs(shown.evaluate("replay.state.t") - t) < 1e-5)
             # The picture follows what the page is told.

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 from interfaces import messages as m
 from interfaces.messages import control as c
-from interfaces.messages.commands import portable
 from interfaces.messages.control import MobileWelcome, Plan, Postures, ProblemCode, ProtocolError, Seen
 from interfaces.messages.fields import LONGEST_TEXT, MOST_NAMES, Epoch
 from interfaces.messages.jobs import Errand, JobForecast, RobotTask, TaskOrder, Tasks
+from interfaces.messages.requests import portable
 from interfaces.messages.sites import DriveOrders, DriveReport, Orders, Report
 from interfaces.stream import LARGEST, Encoding, SharedEncoder, decode, encode
 from interfaces.stream.codec import KINDS, TYPES

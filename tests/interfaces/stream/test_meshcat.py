@@ -15,7 +15,7 @@ import pytest
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.committed import PIECE, CommittedPath
 from interfaces.stream.meshcat.meshes import bodies, shaded, tube
-from interfaces.stream.meshcat.newest import MOST_READERS, Newest, set_transform
+from interfaces.stream.meshcat.newest import MOST_READERS, ROOT, Newest, Nodes, set_transform
 from interfaces.stream.meshcat.objects import module
 from robots import load, puma560
 from robots.puma560.parameters import FLANGE
@@ -446,3 +446,26 @@ def test_a_robot_without_shapes_shows_frames_and_traces() -> None:
     assert state["/vrs/real/trace", "set_property", "visible"] is False
     show(scene, timeline.sample(9.0), now=20.0)
     assert not slot
+
+
+def test_what_stands_in_one_scene_is_seen_in_another_where_it_is_there() -> None:
+    one, other = Nodes(), Nodes()
+    X = np.eye(4)
+    X[:3, 3] = 1.0, 2.0, -0.5
+    one.show_in(other, "arm", X)
+    assert other.values["/beside/arm"][1] == set_transform("/beside/arm", X)
+    one.put_transform(f"{ROOT}/real/body/0", X)
+    one.put_property(f"{ROOT}/real", "visible", False)
+    one.put_property(ROOT, "box", [[0, 0, 0], [1, 1, 1]])
+    assert other.values["/beside/arm/real/body/0"][1] == set_transform("/beside/arm/real/body/0", X)
+    assert "/beside/arm/real visible" in other.values
+    # What is said of the scene as a whole is its own.
+    assert "/beside/arm box" not in other.values
+    assert one.readers == 0
+    woken: list[bool] = []
+    reader = other.join(lambda: woken.append(True))
+    assert (one.readers, other.readers) == (1, 1)
+    one.wake()
+    assert woken == [True]
+    other.leave(reader)
+    assert one.readers == 0

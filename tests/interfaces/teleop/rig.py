@@ -13,8 +13,7 @@ from interfaces.teleop.architectures import ArchitectureRobotSite, Constants, co
 from interfaces.teleop.autonomy import Autonomy, Hands, JourneyPilot
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
-from interfaces.teleop.halt import Halt, HaltCause
-from interfaces.teleop.operator import OperatorSite
+from interfaces.teleop.operator import Halt, HaltCause, OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
 from robots import ipr
 from robots.ipr.parameters import IPR

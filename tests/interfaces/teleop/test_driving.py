@@ -14,7 +14,7 @@ from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import DriveOrders
 from interfaces.teleop.architectures import ARCHITECTURES
 from interfaces.teleop.following_base import TOO_FAR
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from interfaces.teleop.virtual_base import MOVING
 from robots.onboard.driving import IPR_LIMITS, Posture
 from tests.interfaces.teleop.rig import CONTROL, MODEL, TURN, Rig

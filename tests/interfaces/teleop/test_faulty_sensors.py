@@ -14,7 +14,7 @@ from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.paced_body import PacedBody, PacedConfig
 from interfaces.stream.codec import Encoding, decode, encode
 from interfaces.teleop.architectures.compositions import CONTROL
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from robots import load
 from robots.ipr.parameters import IPR
 from robots.mobile.chassis import Senses

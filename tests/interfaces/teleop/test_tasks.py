@@ -28,7 +28,7 @@ from interfaces.messages.jobs import (
     WaitJob,
 )
 from interfaces.messages.sites import DriveOrders
-from interfaces.teleop.halt import HaltCause
+from interfaces.teleop.operator import HaltCause
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture
 from robots.onboard.journey import Goal, JourneyState
 from tests.interfaces.teleop.rig import CONTROL, TURN, Rig

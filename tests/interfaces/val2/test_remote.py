@@ -13,7 +13,7 @@ import pytest
 from interfaces import Designer, Viewer, connect
 from interfaces.messages.control import Lease
 from interfaces.teleop import OperatorSite, RobotSiteConfig, VirtualArm
-from interfaces.teleop.halt import Halt, HaltCause
+from interfaces.teleop.operator import Halt, HaltCause
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, arm_for
 from interfaces.val2.motion.places import READY
