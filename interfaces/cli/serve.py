@@ -198,19 +198,19 @@ def serve(
         "operator-loss": operator_loss,
     }  # fmt: skip
     access = access_for(host, token_file, free=OPEN)
+    speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []
     for k, (robot, name, path) in enumerate(zip(robots, names, records, strict=True)):
         kept = {option: value for option, value in given.items() if option not in untaken(robot)}
         if record is not None and not robot.is_base:
             kept["reports"] = f"{RATE:g}"
         options = ["--robot", name, *(word for option, value in kept.items() for word in (f"--{option}", value))]
-        port_of_val, files_of_val, val_port = (
-            (val_port, val_files, None) if speaks_val(robot) else (None, None, val_port)
-        )
         eye = camera if robot.device(HeadCamera) else 0.0
+        folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
         serving.append(_Serving(
             robot, link, seed + k, policy, at, token, tuple(options), place, _own(jobs, k, robot), eye,
-            port_of_val, files_of_val, path, recordings, behind, architecture, f"/robots/{quote(robot.name, safe='')}" if k else "",
+            val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings, behind,
+            architecture, folder,
         ))  # fmt: skip
     uvloop.run(_serve(serving, access, host, port, allowed, until_eof=until_eof))
 
