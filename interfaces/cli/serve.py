@@ -209,8 +209,8 @@ def serve(
         folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
         serving.append(_Serving(
             robot, link, seed + k, policy, at, token, tuple(options), place, _own(jobs, k, robot), eye,
-            val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings, behind,
-            architecture, folder,
+            val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
+            behind, architecture, folder,
         ))  # fmt: skip
     uvloop.run(_serve(serving, access, host, port, allowed, until_eof=until_eof))
 
