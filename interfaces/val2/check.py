@@ -11,11 +11,11 @@ from typing_extensions import override
 
 from interfaces.val2 import forms
 from interfaces.val2.compiler import compiled_step
-from interfaces.val2.context import MOST_PERCENT, TASKS, TIMERS
+from interfaces.val2.context import CHANNELS, MOST_PERCENT, TASKS, TIMERS
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import Closure, kind_of
-from interfaces.val2.functions import row_of
+from interfaces.val2.functions import UNRESERVED, row_of
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
 from interfaces.val2.memory import Slots
@@ -167,6 +167,7 @@ class _Checker(ProgramCompiler):
             for name, kinds in self._usable.items()
             if len(kinds) == 1 and name not in parameters
         }
+        self._known = {name.lower(): row.gives for name, row in UNRESERVED.items()} | self._known
         """Kinds of names without a prefix."""
         self._reported: set[str] = set()
         self._warnings: list[ValError] = []
@@ -213,7 +214,7 @@ class _Checker(ProgramCompiler):
             made = super().of_kind(kind, e)
         except ValError as failure:
             error, made = failure.at(place=e.at), _nothing
-        if isinstance(e, Variable) and e.name not in self._usable:
+        if isinstance(e, Variable) and not (e.name in self._usable or e.name.upper() in UNRESERVED):
             located = e.prefix == "#" or kind in ("location", "frame", "point")
             what = "Undefined location" if located else "Undefined value"
             error = ValError(what, f"{e.name}; nothing in the file sets it", place=e.at)
@@ -231,7 +232,7 @@ def _nothing(_: Slots) -> None:
 def _given(statement: Instruction) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
-        case Instruction("=" | "DECOMPOSE" | "FOR"):
+        case Instruction("=" | "DECOMPOSE" | "FOR" | "SETI"):
             return "real"
         case Instruction("SET" | "HERE"):
             return "frame"
@@ -373,6 +374,7 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "speed": _range(1e-3, 1e6, "a speed above 0"),
     "mode": _range(0, 3, "a mode, 0 to 3"),
     "task": _range(TASKS[0], TASKS[-1], f"a task, {TASKS[0]} to {TASKS[-1]}"),
+    "channel": _range(CHANNELS[0], CHANNELS[-1], f"a channel, {CHANNELS[0]} to {CHANNELS[-1]}"),
     "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
 """What numbers that are written down have to be."""

@@ -164,7 +164,7 @@ class Controller(Context):
             self.arm.begin_program()
             self.reactions.clear()
             self.warned.clear()
-            self.stop_first = False
+            self.stop_first, self.path = False, (None, None)
             self.signals.begin(self.cell, values, now=self.now)
         self._tasks[number], self._due = task, True
         return task

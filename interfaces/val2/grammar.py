@@ -592,6 +592,11 @@ def _shift(i: Instruction) -> Instruction:
     return Instruction("SET", (i.operands[0], Apply("SHIFT", i.operands, i.at)), (), i.at)
 
 
+def _inverse(i: Instruction) -> Instruction:
+    """`INVERSE a = b` of VAL sets a."""
+    return Instruction("SET", (i.operands[0], Apply("INVERSE", i.operands[1:], i.at)), (), i.at)
+
+
 def _wait(i: Instruction) -> Instruction:
     """`WAIT 3` and `WAIT -3` of VAL wait for an input."""
     value = literal(i.operands[0]) if i.operands else None
@@ -617,6 +622,6 @@ def _prompt(i: Instruction) -> Instruction:
 
 
 _MEANT: Final[dict[str, Callable[[Instruction], Instruction]]] = {
-    "SHIFT": _shift, "WAIT": _wait, "EXIT": _loops, "NEXT": _loops, "PROMPT": _prompt,
+    "INVERSE": _inverse, "SHIFT": _shift, "WAIT": _wait, "EXIT": _loops, "NEXT": _loops, "PROMPT": _prompt,
 }  # fmt: skip
 """What is written shortly, and what it stands for."""

@@ -66,7 +66,7 @@ class Units:
 
     def attach(self, unit: int | None, device: str) -> int:
         """ATTACH a unit, or the first that's free for None; its number, 0 where none is."""
-        disk = device.upper().rstrip(":") in ("", "DISK", "SYSTEM", "A", "C", "D")
+        disk = device.upper().rstrip(":") in ("", "DISK", "NFS", "SYSTEM", "A", "C", "D")
         if not disk or (unit is not None and unit not in (TERMINAL, *DISKS)):
             self.warn(f"ATTACH {device or unit}: only files and the terminal are here, no serial line or pendant")
             self._status[unit or 0] = NOT_READY

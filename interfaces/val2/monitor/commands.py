@@ -358,6 +358,10 @@ _KINDS: Final = (
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "| task",
                    "Stop the program and the arm, within its limits; Ctrl-C does the same.", short="A"),
+    *(MonitorCommand(word, partial(running.channel, word=word), f"| {name} | {name}=value",
+                     f"Show {what}, or set one.", _ARGUMENT, _until("=", _none, _operands))
+      for word, name, what in (("ADC", "channel", "analogue inputs"), ("DAC", "channel", "analogue outputs"),
+                               ("IOGET", "port", "ports that are read"), ("IOPUT", "port", "ports that are set"))),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
                    ours=True),
