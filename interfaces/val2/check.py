@@ -30,7 +30,6 @@ from interfaces.val2.syntax import (
     Apply,
     Compound,
     Expression,
-    Format,
     Instruction,
     Program,
     Variable,
@@ -205,9 +204,9 @@ class _Checker(ProgramCompiler):
         if error is not None:
             self._errors.append(error)
             return _nothing
-        value = literal(e)
-        shares = ("percent",) if {"MMPS", "IPS"} & set(self._statement.words) else ("percent", "speed")
-        if kind in shares and value is not None and value > MOST_PERCENT:
+        shares = kind == "percent" or (kind == "speed" and not {"MMPS", "IPS"} & set(self._statement.words))
+        value = literal(e) if shares else None
+        if value is not None and value > MOST_PERCENT:
             detail = f"{self._statement.keyword} {value:.9g} % counts as {MOST_PERCENT:g} %"
             self._warnings.append(ValError("Value out of range", detail, place=e.at))
         try:
@@ -305,7 +304,7 @@ def _strange_angles(source: SourceFile, *, said: bool) -> Iterator[CheckFinding]
     for program in source.programs:
         for i in (step.statement for step in program.steps):
             words += [i] if i.keyword in _VPLUS_ALONE else []
-            operands = (one for one in i.operands if not isinstance(one, Format | None))
+            operands = (one for one in i.operands if isinstance(one, Apply | Compound))
             inner = [part for operand in operands for part in parts(operand)]
             angles += [
                 (literal(part.arguments[4]) if len(part.arguments) > 4 else None, part.at, program.dialect)
@@ -390,8 +389,8 @@ def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | 
         e: The expression.
         known: What is known of names without a prefix.
     """
-    value, kind = literal(e), kind_of(e, known)
-    if value is not None and asked in _CHECKS:
+    value, kind = literal(e) if asked in _CHECKS else None, kind_of(e, known)
+    if value is not None:
         try:
             _CHECKS[asked](value)
         except ValError as error:
