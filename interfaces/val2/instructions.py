@@ -40,7 +40,7 @@ from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, 
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.motion.speeds import require
 from interfaces.val2.rows import Form, OperandSlot, Origin
-from interfaces.val2.signals import Reactions, reaction_to
+from interfaces.val2.signals import Reaction, Reactions, legal
 from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
     Apply,
@@ -776,8 +776,9 @@ def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     def watch(s: Slots) -> int:
         if i.program:
             context.code(i.program, i.at)
-        immediate = i.keyword == "REACTI"
-        reactions_of(context).add(reaction_to(signal(s), i.program, immediate=immediate, always=_always(i)))
+        number = signal(s)
+        legal(number)
+        reactions_of(context).add(Reaction(int(number), i.program, i.keyword == "REACTI", _always(i)))
         return n + 1
 
     return watch

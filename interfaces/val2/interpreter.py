@@ -28,6 +28,8 @@ from interfaces.val2.printer import print_step
 from interfaces.val2.signals import Reaction, Reactions
 from vrs.errors import VrsError
 
+TRACE_COST: Final = 2_500
+"""Steps for which one that's told by TRACE stands in addition: a person reads them."""
 MOST_CALLS: Final = 1_000
 """How deep programs may call each other."""
 
@@ -154,6 +156,7 @@ class Task:
         if frame.pc >= len(steps) or not frame.name:
             return False
         text = print_step(steps[frame.pc])
+        self.context.extra_steps += TRACE_COST
         self.context.events.append(Traced(frame.name, frame.step, text, self.number))
         return True
 

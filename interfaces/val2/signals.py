@@ -319,13 +319,3 @@ class Reactions:
         if not reaction.always:
             self._watched.pop(abs(reaction.signal), None)
         return reaction
-
-
-def reaction_to(signal: float, program: str, *, immediate: bool, always: bool) -> Reaction:
-    """A reaction.
-
-    Raises:
-        ValError: If there's no such signal.
-    """
-    legal(signal)
-    return Reaction(int(signal), program, immediate, always)

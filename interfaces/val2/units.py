@@ -133,7 +133,8 @@ class Units:
         if path in self._written:
             return self._written[path]
         try:
-            if path.resolve().parent != path.parent.resolve() or path.stat().st_size > LARGEST:
+            inside = path.is_file() and path.resolve().parent == path.parent.resolve()
+            if not inside or path.stat().st_size > LARGEST:
                 return None
             return path.read_text("utf-8", errors="replace").replace("\r\n", "\n")
         except OSError:

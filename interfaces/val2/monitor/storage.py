@@ -148,7 +148,7 @@ def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None,
     """Read a file and take what it holds, in slices."""
     source = yield from read_file(text, name, dialect=state.controller.dialect)
     entries = source.values
-    if len(entries) > MOST_MEANWHILE and state.controller.running:
+    if len(entries) > MOST_MEANWHILE and state.controller.busy:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
     state.refuse_in_use(*(program.name for program in source.programs))
     memory = state.controller.memory

@@ -49,7 +49,9 @@ def test_trace_tells_each_step(sitting: Sitting) -> None:
     said = typed(main="ENABLE TRACE; x = 1; CALL sub; DISABLE TRACE; y = 1", sub="z = 2")
     assert said == "main 2: x = 1main 3: CALL sub()sub 1: z = 2main 4: DISABLE TRACE"
     sitting.type("EDIT one", "x = 1", "E", "ENABLE TRACE")
-    assert sitting.type("EXECUTE one") == "one 1: x = 1\none has ended (END)\n"
+    assert sitting.type("EXECUTE one") == "one 1: x = 1\n"
+    sitting.pass_time(0.1)
+    assert sitting.shown == "one 1: x = 1\none has ended (END)\n"
 
 
 def test_upper_lets_small_letters_count_as_capital_ones() -> None:
