@@ -14,7 +14,7 @@ from interfaces.val2.compiler import compiled_step
 from interfaces.val2.context import CHANNELS, MOST_PERCENT, TASKS, TIMERS
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.expressions import Closure, kind_of
+from interfaces.val2.expressions import WANTED, Closure, kind_of
 from interfaces.val2.functions import UNRESERVED, row_of
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
@@ -345,10 +345,6 @@ def _written(i: Instruction) -> Iterator[Variable]:
                         yield target
 
 
-_SHOWN: Final[Mapping[str, str]] = {
-    "real": "a number", "string": "a string", "frame": "a transformation",
-    "location": "a location", "point": "a precision point",
-}  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
     "string": ("string",), "frame": ("frame",), "point": ("point",), "location": ("frame", "point", "location"),
 }  # fmt: skip
@@ -398,7 +394,7 @@ def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | 
     if asked == "point" and isinstance(e, Apply) and e.function in _STANDING:
         kind = "point"
     if kind and asked not in _UNTOLD and kind not in _FITS.get(asked, ("real",)):
-        detail = f"{_SHOWN[kind]} where {_SHOWN.get(asked, _SHOWN['real'])} is wanted"
+        detail = f"{WANTED[kind]} where {WANTED.get(asked, WANTED['real'])} is wanted"
         return ValError("Mixed types", detail, place=e.at)
     if isinstance(e, Apply) and row_of(e).alike and {"real", "string"} == {kind_of(p, known) for p in children(e)}:
         return ValError("Mixed types", f"a number and a string with {e.function} between them", place=e.at)

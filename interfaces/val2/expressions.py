@@ -35,9 +35,11 @@ Real: TypeAlias = Callable[[Slots], float]
 Test: TypeAlias = Callable[[Slots], bool]
 _GIVEN: Final = {"location": "point", "truth": "real"}
 """Of what kind is what functions give, where they say it otherwise."""
-_WANTED: Final = {
+WANTED: Final = {
     "real": "a number", "string": "a string", "frame": "a transformation", "point": "a precision point",
+    "location": "a location",
 }  # fmt: skip
+"""What errors call values of a kind."""
 PACKED: Final = 128
 """Characters of a string in an array that stands for one text."""
 _PREFIXES: Final = {"real": "", "string": "$", "frame": "", "point": "#"}
@@ -168,14 +170,14 @@ class Expressions:
                 return self._function(e)
             number = self.of_kind("real", e)
             return lambda s: number(s) != 0.0
-        own = kind_of(e)
+        own, asked = kind_of(e), kind
         if kind == "any":
             if isinstance(e, Variable) and not own:
                 return self.read(e)
             kind = own
         elif kind == "location":
             kind = "point" if own == "point" else "frame"
-        elif kind not in _WANTED:
+        elif kind not in WANTED:
             kind = "real"
         match e:
             case Number(value) | Text(value) if own == kind:
@@ -193,9 +195,8 @@ class Expressions:
             case Apply() if own == kind:
                 made = self._function(e)
                 return (lambda s: TRUE if made(s) else 0.0) if row_of(e).gives == "truth" else made
-            case Apply(name) if kind == "real" and name in FUNCTIONS:
-                raise ValError("Invalid expression", name, place=e.at)
-        raise ValError("Invalid expression", f"{_WANTED[kind]} was expected", place=e.at)
+        where = f"{WANTED[own]} where " if own else ""
+        raise ValError("Mixed types", f"{where}{WANTED.get(asked, WANTED[kind])} is wanted", place=e.at)
 
     def _typed(self, e: Variable, type_: type) -> Closure:
         """A closure of a variable without a prefix."""
