@@ -266,11 +266,11 @@ def _instruction(state: TerminalState, before: str, *, alone: bool = False) -> I
     elif keyword == "PARAMETER" and "=" not in before:
         yield from _rows(forms.PARAMETERS)(state, before)
     else:
-        if keyword in {"CALL", "GOSUB", "REACT", "REACTI"}:
-            yield from _programs(state, before)
         if keyword in forms.INSTRUCTIONS:
-            words = forms.INSTRUCTIONS[keyword].allowed_words
-            yield from (Word(one, forms.WORDS.get(one, "")) for one in words)
+            row = forms.INSTRUCTIONS[keyword]
+            if row.rule in ("call", "tasks") or "program" in (slot.kind for slot in row.slots):
+                yield from _programs(state, before)
+            yield from (Word(one, forms.WORDS.get(one, "")) for one in row.allowed_words)
         yield from _operands(state, before)
 
 
