@@ -53,7 +53,7 @@ def check(
     checked = check_files([(text_of(path), path.name) for path in programs], dialect_of(dialect))
     found = [(path, finding) for path, (_, some) in zip(programs, checked, strict=True) for finding in some]
     sources = [source for source, _ in checked if source is not None]
-    if not static and not _wrong(found):
+    if not static and len(sources) == len(programs) and not _wrong(_of(found, sources, program)):
         found += _rehearsed(
             dict(zip(programs, sources, strict=True)), program, val_robot(name).arm, program_files(files)
         )
@@ -71,6 +71,17 @@ def check(
 
 def _wrong(found: Sequence[_Found]) -> bool:
     return any(finding.severity == "error" for _, finding in found)
+
+
+def _of(found: list[_Found], sources: Sequence[SourceFile], program: str) -> list[_Found]:
+    """What was found in the program that's meant and in those that it calls, or in none."""
+    from interfaces.val2.grammar import name_of
+    from interfaces.val2.source import with_called
+
+    known = {one.name: one for source in sources for one in source.programs}
+    first = name_of(program) if program else next(iter(known), "")
+    counted = with_called(known, {first: known[first]}) if first in known else known
+    return [one for one in found if one[1].error.program in ("", *counted)]
 
 
 def _rehearsed(

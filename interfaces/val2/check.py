@@ -11,11 +11,11 @@ from typing_extensions import override
 
 from interfaces.val2 import forms
 from interfaces.val2.compiler import compiled_step
-from interfaces.val2.context import MOST_PERCENT, TASKS, TIMERS
+from interfaces.val2.context import CHANNELS, MOST_PERCENT, TASKS, TIMERS
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.expressions import Closure, kind_of
-from interfaces.val2.functions import row_of
+from interfaces.val2.expressions import WANTED, Closure, kind_of
+from interfaces.val2.functions import UNRESERVED, row_of
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
 from interfaces.val2.memory import Slots
@@ -29,7 +29,6 @@ from interfaces.val2.syntax import (
     Apply,
     Compound,
     Expression,
-    Format,
     Instruction,
     Program,
     Variable,
@@ -167,6 +166,7 @@ class _Checker(ProgramCompiler):
             for name, kinds in self._usable.items()
             if len(kinds) == 1 and name not in parameters
         }
+        self._known = {name.lower(): row.gives for name, row in UNRESERVED.items()} | self._known
         """Kinds of names without a prefix."""
         self._reported: set[str] = set()
         self._warnings: list[ValError] = []
@@ -204,16 +204,16 @@ class _Checker(ProgramCompiler):
         if error is not None:
             self._errors.append(error)
             return _nothing
-        value = literal(e)
-        shares = ("percent",) if {"MMPS", "IPS"} & set(self._statement.words) else ("percent", "speed")
-        if kind in shares and value is not None and value > MOST_PERCENT:
+        shares = kind == "percent" or (kind == "speed" and not {"MMPS", "IPS"} & set(self._statement.words))
+        value = literal(e) if shares else None
+        if value is not None and value > MOST_PERCENT:
             detail = f"{self._statement.keyword} {value:.9g} % counts as {MOST_PERCENT:g} %"
             self._warnings.append(ValError("Value out of range", detail, place=e.at))
         try:
             made = super().of_kind(kind, e)
         except ValError as failure:
             error, made = failure.at(place=e.at), _nothing
-        if isinstance(e, Variable) and e.name not in self._usable:
+        if isinstance(e, Variable) and not (e.name in self._usable or e.name.upper() in UNRESERVED):
             located = e.prefix == "#" or kind in ("location", "frame", "point")
             what = "Undefined location" if located else "Undefined value"
             error = ValError(what, f"{e.name}; nothing in the file sets it", place=e.at)
@@ -231,7 +231,7 @@ def _nothing(_: Slots) -> None:
 def _given(statement: Instruction) -> str:
     """What a statement sets names to: a real, a location, or either."""
     match statement:
-        case Instruction("=" | "DECOMPOSE" | "FOR"):
+        case Instruction("=" | "DECOMPOSE" | "FOR" | "SETI"):
             return "real"
         case Instruction("SET" | "HERE"):
             return "frame"
@@ -304,7 +304,7 @@ def _strange_angles(source: SourceFile, *, said: bool) -> Iterator[CheckFinding]
     for program in source.programs:
         for i in (step.statement for step in program.steps):
             words += [i] if i.keyword in _VPLUS_ALONE else []
-            operands = (one for one in i.operands if not isinstance(one, Format | None))
+            operands = (one for one in i.operands if isinstance(one, Apply | Compound))
             inner = [part for operand in operands for part in parts(operand)]
             angles += [
                 (literal(part.arguments[4]) if len(part.arguments) > 4 else None, part.at, program.dialect)
@@ -345,10 +345,6 @@ def _written(i: Instruction) -> Iterator[Variable]:
                         yield target
 
 
-_SHOWN: Final[Mapping[str, str]] = {
-    "real": "a number", "string": "a string", "frame": "a transformation",
-    "location": "a location", "point": "a precision point",
-}  # fmt: skip
 _FITS: Final[Mapping[str, tuple[str, ...]]] = {
     "string": ("string",), "frame": ("frame",), "point": ("point",), "location": ("frame", "point", "location"),
 }  # fmt: skip
@@ -373,6 +369,7 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "speed": _range(1e-3, 1e6, "a speed above 0"),
     "mode": _range(0, 3, "a mode, 0 to 3"),
     "task": _range(TASKS[0], TASKS[-1], f"a task, {TASKS[0]} to {TASKS[-1]}"),
+    "channel": _range(CHANNELS[0], CHANNELS[-1], f"a channel, {CHANNELS[0]} to {CHANNELS[-1]}"),
     "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
 """What numbers that are written down have to be."""
@@ -388,8 +385,8 @@ def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | 
         e: The expression.
         known: What is known of names without a prefix.
     """
-    value, kind = literal(e), kind_of(e, known)
-    if value is not None and asked in _CHECKS:
+    value, kind = literal(e) if asked in _CHECKS else None, kind_of(e, known)
+    if value is not None:
         try:
             _CHECKS[asked](value)
         except ValError as error:
@@ -397,7 +394,7 @@ def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | 
     if asked == "point" and isinstance(e, Apply) and e.function in _STANDING:
         kind = "point"
     if kind and asked not in _UNTOLD and kind not in _FITS.get(asked, ("real",)):
-        detail = f"{_SHOWN[kind]} where {_SHOWN.get(asked, _SHOWN['real'])} is wanted"
+        detail = f"{WANTED[kind]} where {WANTED.get(asked, WANTED['real'])} is wanted"
         return ValError("Mixed types", detail, place=e.at)
     if isinstance(e, Apply) and row_of(e).alike and {"real", "string"} == {kind_of(p, known) for p in children(e)}:
         return ValError("Mixed types", f"a number and a string with {e.function} between them", place=e.at)

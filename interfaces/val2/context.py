@@ -82,7 +82,18 @@ class SignalChanged:
     on: bool
 
 
-Event: TypeAlias = Typed | Asked | ProgramPaused | ProgramEnded | ProgramFailed | Warned | SignalChanged
+@dataclass(frozen=True, slots=True)
+class Traced:
+    """A step is done, and TRACE is on."""
+
+    program: str
+    step: int
+    """From 1."""
+    text: str
+    task: int = 0
+
+
+Event: TypeAlias = Traced | Typed | Asked | ProgramPaused | ProgramEnded | ProgramFailed | Warned | SignalChanged
 
 
 StepFunction: TypeAlias = Callable[[Slots], int]
@@ -118,6 +129,8 @@ EXTRA_STEP_COST: Final = 9
 MOST_PERCENT: Final = 100.0
 """Of speeds and accelerations: more counts as this."""
 TIMERS: Final = range(16)
+CHANNELS: Final = range(1, 33)
+"""Of analogue inputs and outputs, and of ports, each."""
 SLICE: Final = 0.016
 """How often a wait looks at what changes with time alone [s]: V+'s cycle."""
 
@@ -140,7 +153,7 @@ class Ending:
     """`RETURN` for the call, `STOP` and `END` for the cycle, `HALT` for the program, `PAUSE` for its running; the
     arm stands but for RETURN."""
     step: int = 0
-    """Index of the step to go on with after PAUSE."""
+    """Index of the step to go on with after PAUSE; of RETURN, how many of the caller's steps are passed over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +239,12 @@ class Context(ABC):
     parameters: MutableMapping[str, float] = field(
         default_factory=lambda: {p.name: p.default for p in PARAMETERS.values()}
     )
+    channels: dict[str, dict[int, float]] = field(
+        default_factory=lambda: {word: dict.fromkeys(CHANNELS, 0.0) for word in ("ADC", "DAC", "IOGET", "IOPUT")}
+    )
+    """Simulated values of analogue inputs and outputs and of ports, by what reads or sets them in a program."""
+    path: tuple[bool | None, bool | None] = (None, None)
+    """Whether the arm goes round the ends of the last motion and the next, by CPON and CPOFF; None: as CP says."""
     units: Units = field(default_factory=Units)
     """Files of programs."""
     rng: random.Random = field(default_factory=lambda: random.Random(0))  # noqa: S311
@@ -306,6 +325,16 @@ class Context(ABC):
         """
         if number not in TIMERS:
             raise ValError("Illegal timer number", f"{number:.9g}: 0 to {TIMERS[-1]}")
+        return int(number)
+
+    def channel(self, number: float) -> int:
+        """The number of a channel.
+
+        Raises:
+            ValError: If there's no such channel.
+        """
+        if number not in CHANNELS:
+            raise ValError("Illegal channel number", f"{number:.9g}: {CHANNELS[0]} to {CHANNELS[-1]}")
         return int(number)
 
     def switch(self, name: str, on: bool) -> None:

@@ -118,6 +118,10 @@ class Controller(Context):
         stack = tuple((f.name, f.step) for f in task.frames)
         return ControllerStatus(task.state, *stack[-1], task.cycles, stack, task.word)
 
+    def stacks(self) -> list[tuple[tuple[str, int], ...]]:
+        """Programs and steps of each task that runs, outermost first."""
+        return [self.status(n).stack for n, task in self._tasks.items() if task.state is ProgramState.RUNNING]
+
     # Commands.
 
     def execute(
@@ -164,7 +168,7 @@ class Controller(Context):
             self.arm.begin_program()
             self.reactions.clear()
             self.warned.clear()
-            self.stop_first = False
+            self.stop_first, self.path = False, (None, None)
             self.signals.begin(self.cell, values, now=self.now)
         self._tasks[number], self._due = task, True
         return task

@@ -15,8 +15,17 @@ import numpy as np
 from interfaces.val2 import formats
 from interfaces.val2.context import Context
 from interfaces.val2.errors import TextPosition, ValError
-from interfaces.val2.functions import FUNCTIONS, TRUE, row_of
-from interfaces.val2.memory import MOST_DIMENSIONS, Key, Slots, VariableSlot, index, mismatch, undefined
+from interfaces.val2.functions import FUNCTIONS, TRUE, UNRESERVED, row_of, whole
+from interfaces.val2.memory import (
+    LONGEST_STRING,
+    MOST_DIMENSIONS,
+    Key,
+    Slots,
+    VariableSlot,
+    index,
+    mismatch,
+    undefined,
+)
 from interfaces.val2.rows import Kind, OperandSlot
 from interfaces.val2.syntax import Apply, Compound, Expression, Format, Number, Text, Variable
 from interfaces.val2.values import Dialect, Transformation, Value
@@ -26,9 +35,13 @@ Real: TypeAlias = Callable[[Slots], float]
 Test: TypeAlias = Callable[[Slots], bool]
 _GIVEN: Final = {"location": "point", "truth": "real"}
 """Of what kind is what functions give, where they say it otherwise."""
-_WANTED: Final = {
+WANTED: Final = {
     "real": "a number", "string": "a string", "frame": "a transformation", "point": "a precision point",
+    "location": "a location",
 }  # fmt: skip
+"""What errors call values of a kind."""
+PACKED: Final = 128
+"""Characters of a string in an array that stands for one text."""
 _PREFIXES: Final = {"real": "", "string": "$", "frame": "", "point": "#"}
 """Of names of values of a kind."""
 
@@ -117,6 +130,8 @@ class Expressions:
         """The value of a variable, whatever it is."""
         place = self.slot(variable.name)
         key = self.key(variable) if variable.indices else None
+        row = None if variable.indices else UNRESERVED.get(variable.name.upper())
+        standing = None if row is None else self._function(Apply(row.name, (), variable.at))
 
         def value(s: Slots) -> Value:
             slot: VariableSlot | None = s[place] if isinstance(place, int) else place
@@ -126,6 +141,9 @@ class Expressions:
                 k = key(s)
                 slot = slot.elements.get(k) if slot.elements else None
             if slot is None or slot.value is None:
+                if standing is not None:
+                    value: Value = standing(s)
+                    return value
                 raise undefined(variable, k, location=location)
             return slot.value
 
@@ -152,14 +170,14 @@ class Expressions:
                 return self._function(e)
             number = self.of_kind("real", e)
             return lambda s: number(s) != 0.0
-        own = kind_of(e)
+        own, asked = kind_of(e), kind
         if kind == "any":
             if isinstance(e, Variable) and not own:
                 return self.read(e)
             kind = own
         elif kind == "location":
             kind = "point" if own == "point" else "frame"
-        elif kind not in _WANTED:
+        elif kind not in WANTED:
             kind = "real"
         match e:
             case Number(value) | Text(value) if own == kind:
@@ -177,9 +195,8 @@ class Expressions:
             case Apply() if own == kind:
                 made = self._function(e)
                 return (lambda s: TRUE if made(s) else 0.0) if row_of(e).gives == "truth" else made
-            case Apply(name) if kind == "real" and name in FUNCTIONS:
-                raise ValError("Invalid expression", name, place=e.at)
-        raise ValError("Invalid expression", f"{_WANTED[kind]} was expected", place=e.at)
+        where = f"{WANTED[own]} where " if own else ""
+        raise ValError("Mixed types", f"{where}{WANTED.get(asked, WANTED[kind])} is wanted", place=e.at)
 
     def _typed(self, e: Variable, type_: type) -> Closure:
         """A closure of a variable without a prefix."""
@@ -241,12 +258,17 @@ class Expressions:
             texts = alike or "string" in map(kind_of, given)  # type: ignore[arg-type]
             slots = (OperandSlot("", "string" if texts else "real"),)
             act = operator.add if texts and row.name == "+" else act
+            act = partial(self._compared, act) if texts and row.gives == "truth" else act
         parts = self.operands(slots, given, row.name, e.at)
         if "context" in row.tags:
             return _placed(partial(act, self.context), parts, e.at)
         if "dialect" in row.tags:
             return _placed(partial(act, self.dialect), parts, e.at)
         return _placed(act, parts, e.at) if parts else _constant(act())
+
+    def _compared(self, compare: Callable[[str, str], bool], a: str, b: str) -> bool:
+        """A comparison of strings, of any case where UPPER says so."""
+        return compare(a.upper(), b.upper()) if self.context.switches["UPPER"] else compare(a, b)
 
 
 def _constant(value: Any) -> Closure:
@@ -343,8 +365,46 @@ def _decode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
     return decode
 
 
+def packed(
+    x: Expressions, target: Expression, first: Closure, count: Closure
+) -> Callable[[Slots], tuple[list[VariableSlot], str, int, int]]:
+    """Elements of an array of strings that stand for one text, `PACKED` characters each.
+
+    Returns:
+        Those of a part of that text, what they hold, where the part begins in it, and how long it is.
+    """
+    if not isinstance(target, Variable) or target.prefix != "$" or not target.indices:
+        raise ValError("Invalid argument", "an element of an array of strings is wanted", place=target.at)
+    place, key, memory = x.slot(target.name), x.key(target), x.context.memory
+
+    def part(s: Slots) -> tuple[list[VariableSlot], str, int, int]:
+        begin, length = whole(first(s)) - 1, whole(count(s))
+        if begin < 0 or not 0 <= length <= LONGEST_STRING:
+            raise ValError(
+                "Illegal value", f"from {begin + 1}, {length} characters: 1 on, {LONGEST_STRING} at most"
+            )
+        array, found = s[place] if isinstance(place, int) else place, key(s)
+        *before, last = found if isinstance(found, tuple) else (found,)
+        keys = [last + k for k in range(begin // PACKED, (begin + max(length, 1) - 1) // PACKED + 1)]
+        slots = [memory.element(array, (*before, k) if before else k) for k in keys]
+        return slots, "".join(str(slot.value or "").ljust(PACKED, "\0") for slot in slots), begin % PACKED, length
+
+    return part
+
+
+def _unpack(x: Expressions, e: Apply) -> Callable[[Slots], str]:
+    first, count = x.operands(FUNCTIONS["$UNPACK"].slots[1:], e.arguments[1:], e.function, e.at)
+    part = packed(x, e.arguments[0], first, count)  # type: ignore[arg-type]
+
+    def unpack(s: Slots) -> str:
+        _, text, begin, length = part(s)
+        return text[begin : begin + length].rstrip("\0")
+
+    return unpack
+
+
 OF_NAMES: Final[dict[str, Callable[[Expressions, Apply], Closure]]] = {
     "DEFINED": _defined, "LAST": _last, "PARAMETER": _setting, "SWITCH": _setting, "$DECODE": _decode,
-    "$ENCODE": _encode,
+    "$ENCODE": _encode, "$UNPACK": _unpack,
 }  # fmt: skip
 """Functions of names, not values."""

@@ -34,8 +34,8 @@ UNAVAILABLE: Final = {
 """Keywords without whose work a program would do something else: an error where it comes there, and why."""
 
 IGNORED: Final = UNAVAILABLE.keys() | {
-    "DISABLE.EVENT", "ENABLE.EVENT", "FCMND", "FOPEN", "FOPEND", "FSEEK", "FSET", "INTOFF", "INTON", "MULTIPLE",
-    "NOOVERLAP", "OVERLAP", "RELEASE", "SELECT", "SINGLE", "UNLOCK",
+    "DISABLE.EVENT", "ENABLE.EVENT", "FCMND", "FOPEN", "FOPEND", "FSEEK", "FSET", "INTOFF", "INTON", "NOOVERLAP",
+    "OVERLAP", "RELEASE", "SELECT", "UNLOCK",
 }  # fmt: skip
 """Keywords that are recognised but have no meaning here, with those."""
 
@@ -47,9 +47,12 @@ _NOT_HERE: Final = frozenset(
 
 def _abbreviations() -> dict[str, str]:
     """Beginnings that only one instruction has, and the instruction, as VAL takes them."""
-    known = INSTRUCTIONS.keys() | IGNORED | _NOT_HERE
+    whole = {row.name for row in INSTRUCTIONS.values() if "whole" in row.tags}
+    known = (INSTRUCTIONS.keys() | IGNORED | _NOT_HERE) - whole
     begun = Counter(word[:n] for word in known for n in range(1, len(word) + 1))
-    return {name[:n]: name for name in INSTRUCTIONS for n in range(1, len(name)) if begun[name[:n]] == 1}
+    return {
+        name[:n]: name for name in INSTRUCTIONS.keys() - whole for n in range(1, len(name)) if begun[name[:n]] == 1
+    }
 
 
 ABBREVIATIONS: Final = _abbreviations()

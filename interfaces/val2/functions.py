@@ -233,12 +233,20 @@ _FUNCTIONS: Final = (
          tags="context"),
     Form("COS", "angle -> real", "Cosine of an angle [deg].", "VAL-II", cosine),
     Form("DEFINED", "variable:name -> real", "Whether a variable has a value.", "V+"),
+    Form("ADC", "channel:channel -> real", "Value of an analogue input.", "VAL-II",
+         lambda c, n: c.channels["ADC"][c.channel(n)], tags="context reading"),
     Form("DISTANCE", "a:frame, b:frame -> real", "Distance of two locations [mm].", "VAL-II",
          lambda a, b: float(np.linalg.norm(a.X[:3, 3] - b.X[:3, 3]))),
     Form("DX", "a:frame -> real", "X of a location [mm].", "VAL-II", lambda a: float(a.X[0, 3])),
     Form("DY", "a:frame -> real", "Y of a location [mm].", "VAL-II", lambda a: float(a.X[1, 3])),
     Form("DZ", "a:frame -> real", "Z of a location [mm].", "VAL-II", lambda a: float(a.X[2, 3])),
     Form("FRACT", "x -> real", "Fractional part.", "VAL-II", lambda x: math.fmod(x, 1.0)),
+    Form("HAND", "-> real", "Opening of the hand [mm], where no variable is called so.", "VAL-II",
+         lambda c: c.arm.here(now=c.now).hand, usage="HAND", tags="context unreserved reading"),
+    Form("IDENTICAL", "a:location, b:location -> truth", "Whether two locations are the same.", "VAL-II",
+         lambda a, b: a == b, tags="reading"),
+    Form("IOGET", "port:channel -> real", "Value of a port.", "VAL-II",
+         lambda c, n: c.channels["IOGET"][c.channel(n)], tags="context reading"),
     Form("INRANGE", "a:location -> real", "0 if a location can be reached.", "V+",
          lambda c, location: 0.0 if c.arm.reaches(location, now=c.now) else 1.0, tags="context"),
     Form("INT", "x -> real", "Integer part.", "VAL-II", lambda x: float(math.trunc(x))),
@@ -266,6 +274,8 @@ _FUNCTIONS: Final = (
     Form("SWITCH", "name:name -> real", "Whether a switch is on.", "V+"),
     Form("TAN", "angle -> real", "Tangent of an angle [deg].", "V+",
          lambda angle: divide(sine(angle), cosine(angle))),
+    Form("TIME", "-> real", "Session time [s], where no variable is called so.", "VAL-II", lambda c: c.now,
+         usage="TIME", tags="context unreserved reading"),
     Form("TIMER", "number -> real", "Seconds since a timer was set to 0.", "VAL-II",
          lambda c, number: c.now - c.timers[c.timer(number)], tags="context"),
     Form("VAL", "text:string -> real", "The number that a string begins with.", "VAL-II", leading_number),
@@ -281,6 +291,9 @@ _FUNCTIONS: Final = (
     Form("$MID", "text:string, from, length -> string", "Part of a string.", "VAL-II", _mid),
     Form("$TRUNCATE", "text:string -> string", "A string up to its first character of code 0.", "V+",
          lambda text: text.partition("\0")[0]),
+    Form("$UNPACK", "$array:variable, first, count -> string",
+         "Part of a text that an array's elements hold one after the other.", "VAL-II",
+         usage="$UNPACK($array[index], first, count)", tags="reading"),
     # Locations.
     Form("TRANS", "x?=0, y?=0, z?=0, o?, a?, t? -> frame",
          "A transformation [mm, deg], in V+ by yaw, pitch, roll; without angles, no turn.", "VAL-II", _trans,
@@ -302,6 +315,8 @@ _FUNCTIONS: Final = (
          tags="constant context"),
     Form("TOOL", "-> frame", "The tool transformation in force.", "V+", lambda c: c.arm.tool(),
          tags="constant context"),
+    Form("BASE", "-> frame", "The base in force, where no variable is called so.", "V+", lambda c: c.arm.base(),
+         usage="BASE", tags="context unreserved"),
     Form("#PPOINT", "j1?=0, j2?=0, j3?=0, j4?=0, j5?=0, j6?=0 -> location", "A precision point [deg].", "VAL-II",
          _ppoint),
     Form("#HERE", "-> location", "Where the arm is, as a precision point.", "ours",
@@ -330,6 +345,9 @@ _FUNCTIONS: Final = (
 
 FUNCTIONS: Final[dict[str, Form]] = {row.name: row for row in _FUNCTIONS}
 """Functions and constants, with their prefixes."""
+
+UNRESERVED: Final = {row.name: row for row in FUNCTIONS.values() if "unreserved" in row.tags}
+"""What may be written without parentheses, and may be a variable's name, too: then that's what it is."""
 
 ALIASES: Final = {"PPOINT": "#PPOINT", "#PDEST": "#DEST", "#PHERE": "#HERE"}
 """Other spellings of functions, and what they become."""

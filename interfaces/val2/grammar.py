@@ -460,7 +460,7 @@ class _Trees:
         if indices is None and upper in forms.CONSTANTS:
             return Apply(forms.ALIASES.get(upper, upper), (), _at(token))
         if indices is None and upper in forms.OPERATORS:
-            raise _misplaced(token)
+            raise _misplaced(token, _at(token))
         return Variable(name_of(token), tuple(indices or ()), _at(token), array=indices == [])
 
     def indices(self, parts: list[Any]) -> list[Any]:
@@ -483,41 +483,69 @@ class _Trees:
                     arguments.append(self.format([one]))
                 case "":
                     arguments.append(one)
-        return _applied(token, arguments)
+        return _applied(token, _at(token), arguments)
 
     def numbers(self, parts: list[Any]) -> Apply:
         """A function of numbers that are written down, which is one token."""
         (token,) = parts
-        name, _, listed = token.partition("(")
-        arguments: list[Expression] = []
-        for found in _SIGNED.finditer(listed):
-            column = token.column + len(name) + 1 + found.start(2)
-            value = _number(found[2], TextPosition(token.line, column))
-            arguments.append(Apply("-", (value,), TextPosition(token.line, column - 1)) if found[1] else value)
-        return _applied(token.update(value=name.rstrip()), arguments)
+        return _of_numbers(token, token.line, token.column)
 
 
-def _applied(token: Node, arguments: Sequence[Expression | Format | None]) -> Apply:
+def _of_numbers(text: str, line: int, column: int) -> Apply:
+    """A function of numbers that are written down."""
+    name, _, listed = text.partition("(")
+    begin = column + len(name) + 1
+    arguments: list[Expression] = []
+    for found in _SIGNED.finditer(listed):
+        value = _number(found[2], TextPosition(line, begin + found.start(2)))
+        signed = found[1] and Apply("-", (value,), TextPosition(line, begin + found.start(1)))
+        arguments.append(signed or value)
+    return _applied(name.rstrip(), TextPosition(line, column), arguments)
+
+
+@cache
+def _moves() -> tuple[frozenset[str], re.Pattern[str]]:
+    """Motions to a place and nothing else, and how lines look that are one to a function of numbers."""
+    words = (row.name for row in forms.INSTRUCTIONS.values() if row.rule == "motion" and len(row.slots) == 1)
+    called = _lark().get_terminal("CALL_OF_NUMBERS").pattern.value
+    return frozenset(words), re.compile(rf"([ \t]*)([A-Za-z]+)([ \t]+)({called})[ \t]*")
+
+
+def read_move(text: str, line: int) -> Instruction | None:
+    """A motion to a function of numbers, of which long programs are full, without the grammar; None of all else.
+
+    Raises:
+        ValError: If there's no such function, or it takes another number of them.
+    """
+    words, looks = _moves()
+    found = looks.fullmatch(text)
+    if found is None or (word := found[2].upper()) not in words:
+        return None
+    place = _of_numbers(found[4], line, found.start(4) + 1)
+    return Instruction(word, (place,), at=TextPosition(line, found.start(2) + 1))
+
+
+def _applied(word: str, at: TextPosition, arguments: Sequence[Expression | Format | None]) -> Apply:
     """A function of arguments.
 
     Raises:
         ValError: If there's no such function, or it takes another number of them.
     """
-    name = forms.ALIASES.get(token.upper(), token.upper())
+    upper = word.upper()
+    name = forms.ALIASES.get(upper, upper)
     function = forms.FUNCTIONS.get(name)
     if function is None:
         if name in forms.OPERATORS:
-            raise _misplaced(token)
-        detail = f"{token.upper()}{did_you_mean(name, forms.FUNCTIONS)}; an array has brackets"
-        raise ValError("Undefined function", detail, place=_at(token))
+            raise _misplaced(word, at)
+        detail = f"{upper}{did_you_mean(name, forms.FUNCTIONS)}; an array has brackets"
+        raise ValError("Undefined function", detail, place=at)
     given = () if arguments == [None] else tuple(arguments)
-    function.expect(given, _at(token))
-    return Apply(name, given, _at(token))
+    function.expect(given, at)
+    return Apply(name, given, at)
 
 
-def _misplaced(token: Node) -> ValError:
-    detail = f"{token.upper()} can't stand here; parentheses may be missing"
-    return ValError("Syntax error", detail, place=_at(token))
+def _misplaced(word: str, at: TextPosition) -> ValError:
+    return ValError("Syntax error", f"{word.upper()} can't stand here; parentheses may be missing", place=at)
 
 
 def _count(row: Form, operands: Sequence[Expression | Format | None]) -> None:
@@ -593,6 +621,11 @@ def _shift(i: Instruction) -> Instruction:
     return Instruction("SET", (i.operands[0], Apply("SHIFT", i.operands, i.at)), (), i.at)
 
 
+def _inverse(i: Instruction) -> Instruction:
+    """`INVERSE a = b` of VAL sets a."""
+    return Instruction("SET", (i.operands[0], Apply("INVERSE", i.operands[1:], i.at)), (), i.at)
+
+
 def _wait(i: Instruction) -> Instruction:
     """`WAIT 3` and `WAIT -3` of VAL wait for an input."""
     value = literal(i.operands[0]) if i.operands else None
@@ -623,7 +656,7 @@ def _correction(i: Instruction) -> Instruction:
 
 
 _MEANT: Final[dict[str, Callable[[Instruction], Instruction]]] = {
-    "SHIFT": _shift, "WAIT": _wait, "EXIT": _loops, "NEXT": _loops, "PROMPT": _prompt,
+    "INVERSE": _inverse, "SHIFT": _shift, "WAIT": _wait, "EXIT": _loops, "NEXT": _loops, "PROMPT": _prompt,
     "ALTER": _correction,
 }  # fmt: skip
 """What is written shortly, and what it stands for."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias, TypeVar
 
@@ -34,13 +35,13 @@ from interfaces.val2.context import (
     Warned,
 )
 from interfaces.val2.errors import ValError
-from interfaces.val2.expressions import Expressions, kind_of
+from interfaces.val2.expressions import PACKED, Expressions, kind_of, packed
 from interfaces.val2.functions import OPERATORS, whole
 from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.motion.speeds import require
 from interfaces.val2.rows import Form, OperandSlot, Origin
-from interfaces.val2.signals import Reactions, reaction_to
+from interfaces.val2.signals import Reaction, Reactions, legal
 from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
     Apply,
@@ -250,6 +251,19 @@ def _correct(c: Context, _: Instruction, *values: float) -> None:
         c.warn(Warned(f"ALTOUT: {late}"))
 
 
+def _channel(c: Context, i: Instruction, number: float, value: float) -> None:
+    """DAC, IOPUT."""
+    c.channels[i.keyword][c.channel(number)] = value
+
+
+def _path(c: Context, i: Instruction) -> None:
+    """CPON, CPOFF: of the end of the next motion; ALWAYS: of each, as the switch CP."""
+    on = i.keyword == "CPON"
+    if _always(i):
+        c.switch("CP", on)
+    c.path = c.path[0], None if _always(i) else on
+
+
 def _base(c: Context, _: Instruction, first: float | Transformation, *others: float) -> None:
     if not isinstance(first, Transformation):
         *way, turn = others
@@ -360,7 +374,9 @@ def _write(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 T = TypeVar("T")
 Pause: TypeAlias = Generator[float, None, T]
-_CHANGING: Final = {"TIMER", "HERE", "#HERE", "DEST", "#DEST", "RANDOM", "SPEED", "STATE"}
+_CHANGING: Final = {
+    "ADC", "DEST", "#DEST", "HAND", "HERE", "#HERE", "IOGET", "IOSTAT", "RANDOM", "SPEED", "STATE", "TIME", "TIMER",
+}  # fmt: skip
 """Functions whose values change with time alone."""
 
 
@@ -386,10 +402,19 @@ def until(context: Context, look: _Look) -> Pause[None]:
 
 def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None, int]:
     """Ask for a motion, and wait until it has begun; what a REACTI dropped before it began is asked for again."""
+    goes_round, ends = context.path
     while True:
         yield from until(context, context.arm.settled if context.stop_first else context.arm.ready)
         context.powered()
-        ask()
+        if goes_round is None:
+            ask()
+        else:
+            context.arm.set_continuous_path(goes_round)
+            try:
+                ask()
+            finally:
+                context.arm.set_continuous_path(context.switches["CP"])
+        context.path = ends, None
         context.stop_first = context.braked = False
         context.moved = True
         dropped = context.dropped
@@ -533,7 +558,10 @@ def _here(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 def _changes(e: Expression) -> bool:
     """Whether the value of an expression changes with time alone."""
-    return any(isinstance(part, Apply) and part.function in _CHANGING for part in parts(e))
+    named = (
+        p.function if isinstance(p, Apply) else p.name.upper() for p in parts(e) if isinstance(p, Apply | Variable)
+    )
+    return any(name in _CHANGING for name in named)
 
 
 def _wait(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -605,9 +633,13 @@ def _divide(x: ProgramCompiler, _: Instruction, n: int) -> StepFunction:
     return lambda _: target
 
 
-def _leave(x: ProgramCompiler, _i: Instruction, _n: int) -> StepFunction:
-    action = Ending("RETURN")
-    return x.special(lambda _: action)
+def _leave(x: ProgramCompiler, i: Instruction, _n: int) -> StepFunction:
+    """RETURN; RETURN n of VAL passes over so many steps of the one that called."""
+    if not i.operands:
+        action = Ending("RETURN")
+        return x.special(lambda _: action)
+    skipped = x.of_kind("real", i.operands[0])
+    return x.special(lambda s: Ending("RETURN", max(whole(skipped(s)), 0)))
 
 
 def _if(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -747,8 +779,9 @@ def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     def watch(s: Slots) -> int:
         if i.program:
             context.code(i.program, i.at)
-        immediate = i.keyword == "REACTI"
-        reactions_of(context).add(reaction_to(signal(s), i.program, immediate=immediate, always=_always(i)))
+        number = signal(s)
+        legal(number)
+        reactions_of(context).add(Reaction(int(number), i.program, i.keyword == "REACTI", _always(i)))
         return n + 1
 
     return watch
@@ -788,6 +821,37 @@ def _assign(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
         return following
 
     return assign
+
+
+def _assign_integer(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """SETI of VAL, whose numbers are integers."""
+    (name, e), memory = i.operands, x.context.memory
+    if name.prefix:
+        raise mismatch(name)
+    slot, read = x.reference(name), x.of_kind("real", e)
+
+    def assign(s: Slots) -> int:
+        value = float(whole(read(s)))
+        memory.store(slot(s), value, name)
+        return n + 1
+
+    return assign
+
+
+def _pack(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    """PACK a string into the text that an array's elements hold one after the other."""
+    target, *others = i.operands
+    first, count, new = x.operands(STATEMENTS["PACK"].slots[1:], others, i.keyword, i.at)
+    part = packed(x, target, first, count)
+
+    def pack(s: Slots) -> int:
+        (slots, text, begin, length), piece = part(s), new(s)
+        text = text[:begin] + piece[:length].ljust(length, "\0") + text[begin + length :]
+        for k, slot in enumerate(slots):
+            x.context.memory.store(slot, text[k * PACKED : (k + 1) * PACKED].rstrip("\0"), target)
+        return x.context.go_on(n + 1)
+
+    return pack
 
 
 def _decompose(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -836,6 +900,11 @@ def _type(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
         return context.go_on(n + 1)
 
     return type_
+
+
+def _type_integer(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    x.of_kind("real", i.operands[0])
+    return _type(x, replace(i, operands=(Format("I"), *i.operands)), n)
 
 
 def _asking(
@@ -969,6 +1038,13 @@ _ROWS: Final = (
     Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", _setting(_configure)),
     Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
     Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
+    *(Form(name, "", f"{what} the end of the next motion; ALWAYS: of each.", "VAL-II", _setting(_path),
+           words="ALWAYS", tags="reading")
+      for name, what in (("CPON", "The arm goes round"), ("CPOFF", "The arm stops at"))),
+    *(Form(name, "", f"Joint 6 {what} in the next MOVE to a transformation; ALWAYS: each.", "VAL-II",
+           _setting(lambda c, i: c.arm.set_turns(i.keyword == "SINGLE", always=_always(i))), words="ALWAYS",
+           tags="reading")
+      for name, what in (("SINGLE", "turns to within half a turn"), ("MULTIPLE", "turns as far as it's nearest"))),
     Form("TOOL", "transformation:frame?", "The tool's tip relative to the flange; NULL without one.", "VAL",
          _at_rest(lambda c, _, tool: c.arm.set_tool(NULL if tool is None else tool))),
     Form("BASE", "dx?=0, dy?=0, dz?=0, turn?=0",
@@ -1012,6 +1088,13 @@ _ROWS: Final = (
          usage="SET variable = location", tags="beside", rule="set"),
     Form("HERE", "variable:variable", "Record where the tool is; of a compound, its last part.", "VAL", _here,
          tags="beside"),
+    Form("SETI", "variable:variable, value", "Assign the integer part of a number.", "VAL", _assign_integer,
+         usage="SETI variable = value", tags="beside whole", rule="set"),
+    Form("INVERSE", "variable:variable, location:frame", "Assign the transformation back of a location.", "VAL",
+         _passed, usage="INVERSE variable = location", tags="beside whole", rule="set"),
+    Form("PACK", "$array:variable, first, count, text:string",
+         "Put a string into the text that an array's elements hold one after the other.", "VAL-II", _pack,
+         usage="PACK $array[index], first, count = text", tags="beside reading", rule="group"),
     Form("DECOMPOSE", "array:variable, location:location", "Six numbers of a location into an array's elements.",
          "V+", _decompose, usage="DECOMPOSE array[first] = location", tags="beside", rule="set"),
     Form("SHIFT", "variable:variable, dx?, dy?, dz?", "Shift a location in world axes [mm].", "VAL", _passed,
@@ -1022,6 +1105,12 @@ _ROWS: Final = (
     Form("BITS", "first:output, count?=1, value", "Turn a group of signals on or off, by the bits of a value.",
          "V+", _now(lambda c, _, *group: c.signals.set_group(*group)), usage="BITS first[, count] = value",
          tags="beside", rule="group"),
+    Form("PULSE", "signal:output, seconds:seconds?=0.2", "Turn an output on for a time, without waiting.", "VAL-II",
+         _now(lambda c, _, signal, seconds: c.signals.pulse(signal, seconds, now=c.now)), tags="beside reading"),
+    Form("DAC", "channel:channel, value", "Set an analogue output.", "VAL-II", _now(_channel),
+         usage="DAC channel = value", tags="beside reading", rule="timing"),
+    Form("IOPUT", "port:channel, value", "Set a port.", "VAL-II", _now(_channel), usage="IOPUT port = value",
+         tags="beside reading", rule="timing"),
     Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
     Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
     Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
@@ -1061,7 +1150,8 @@ _ROWS: Final = (
     Form("CALL", "argument:any?*", "Call a program; arguments by reference.", "VAL-II", _call,
          usage="CALL program(argument, ..)", rule="call"),
     Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program", rule="call"),
-    Form("RETURN", "", "Go back to the program that called.", "VAL", _leave, tags="program"),
+    Form("RETURN", "skipped?", "Go back to the program that called, over so many of its steps.", "VAL", _leave,
+         tags="program"),
     Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
     Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
     Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
@@ -1106,6 +1196,7 @@ _ROWS: Final = (
     # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
          rule="items"),
+    Form("TYPEI", "value", "Print a number as an integer.", "VAL", _type_integer, tags="beside whole"),
     Form("PROMPT", "text:string?, variable:variable?*", "Print a text, read values.", "VAL-II", _prompt),
     Form("REMARK", "text:text?", "A comment.", "VAL", _passed, usage="REMARK text", rule="remark"),
     Form("AUTO", "name:variable*", "Names of this call of the program alone.", "V+", _passed,

@@ -18,14 +18,18 @@ from interfaces.val2.context import (
     ProgramFailed,
     ProgramPaused,
     ProgramState,
+    Traced,
     Waiting,
 )
 from interfaces.val2.errors import ValError
 from interfaces.val2.instructions import until
 from interfaces.val2.memory import VariableSlot
+from interfaces.val2.printer import print_step
 from interfaces.val2.signals import Reaction, Reactions
 from vrs.errors import VrsError
 
+TRACE_COST: Final = 2_500
+"""Steps for which one that's told by TRACE stands in addition: a person reads them."""
 MOST_CALLS: Final = 1_000
 """How deep programs may call each other."""
 
@@ -130,7 +134,9 @@ class Task:
                 self._react()
                 frame = self.frames[-1]
                 if frame.waiting is None:
-                    done += self._compute(frame, 1 if self.single else most - done) + self.context.extra_steps
+                    traced = self.context.switches["TRACE"] and self._trace(frame)
+                    done += self._compute(frame, 1 if self.single or traced else most - done)
+                    done += self.context.extra_steps
                     self.context.extra_steps = 0
                 elif not self._wait(frame):
                     break
@@ -143,6 +149,16 @@ class Task:
         self.context.notice()
         self.context.task = None
         return done
+
+    def _trace(self, frame: CallFrame) -> bool:
+        """Tell which step is done; whether there's one, a DO's not counted."""
+        steps = frame.code.program.steps
+        if frame.pc >= len(steps) or not frame.name:
+            return False
+        text = print_step(steps[frame.pc])
+        self.context.extra_steps += TRACE_COST
+        self.context.events.append(Traced(frame.name, frame.step, text, self.number))
+        return True
 
     def _compute(self, frame: CallFrame, most: int) -> int:
         steps, slots, pc = frame.code.steps, frame.slots, frame.pc
@@ -180,8 +196,8 @@ class Task:
             case Invoke(code, slots, following):
                 self._push(CallFrame(code, slots, frame.level))
                 frame.pc = following
-            case Ending("RETURN"):
-                self._leave(frame)
+            case Ending("RETURN", skipped):
+                self._leave(frame, skipped)
             case Ending("PAUSE", step):
                 frame.pc = step
                 self.pause("PAUSE")
@@ -193,12 +209,13 @@ class Task:
             raise ValError("Too many calls", f"{MOST_CALLS} at most")
         self.frames.append(frame)
 
-    def _leave(self, frame: CallFrame) -> None:
+    def _leave(self, frame: CallFrame, skipped: int = 0) -> None:
         frame.drop()
         if len(self.frames) == 1:
             frame.waiting = Waiting(_resting(self.context, arm=self.robot))
             return
         self._release(self.frames.pop())
+        self.frames[-1].pc = min(self.frames[-1].pc + skipped, len(self.frames[-1].code.program.steps))
         if frame.level > self.frames[-1].level:
             self.reactions.locked = False
 

@@ -75,6 +75,8 @@ def _check_one_line(text: str, line: int) -> None:
 @lru_cache(maxsize=8192)
 def cached_step(text: str, line: int) -> Step:
     """The step of a line that is short enough; files repeat their lines."""
+    if (move := grammar.read_move(text, line)) is not None:
+        return Step(move, at=move.at)
     label, statement, comment = grammar.read(text, "line", line)
     found = _BEFORE.match(text)
     begin = 0 if found is None or _NO_STATEMENT.match(text, found.end()) else found.end()

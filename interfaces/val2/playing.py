@@ -20,6 +20,7 @@ from interfaces.val2.context import (
     ProgramPaused,
     ProgramState,
     SignalChanged,
+    Traced,
     Typed,
     Warned,
 )
@@ -143,6 +144,8 @@ class Player:
                     self._ended |= task == 0
                 elif not self.done and not self._go_on(task, now, True):
                     self._listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
+            case Traced(program, step, line):
+                self._listeners.warned(f"{program} {step}: {line}")
             case ProgramEnded(task=0):
                 self._ended = True
             case ProgramEnded():

@@ -13,9 +13,9 @@ from typing import Any, Final, Literal, TypeAlias
 from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
-    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "task", "signal",
-    "output", "string", "alike", "location", "frame", "point", "any", "label", "count", "program", "variable",
-    "array", "name", "text",
+    "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "task", "channel",
+    "signal", "output", "string", "alike", "location", "frame", "point", "any", "label", "count", "program",
+    "variable", "array", "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
 what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
@@ -82,8 +82,9 @@ class Form:
             tags: What else is to be known of it: of a function `constant` (it may be written without parentheses,
                 and its name can't be a variable's), `context`, `dialect` (its first argument is that); of an
                 instruction `opens`, `closes` (a structure; both: divides one), `program` (it can't stand alone),
-                `beside` (DO may do it while a program runs); of both `reading` (no source could be read that has
-                more than the word: the form is our reading); of a monitor command what `monitor/commands.py` says.
+                `beside` (DO may do it while a program runs), `whole` (it isn't abbreviated); of a function
+                `unreserved` (see `functions.UNRESERVED`); of both `reading` (no source could be read that has more
+                than the word: the form is our reading); of a monitor command what `monitor/commands.py` says.
             level: How tightly an operator binds.
         """
         operands, _, gives = spelled.partition("-> ")
@@ -152,6 +153,8 @@ SWITCHES: Final = {
         Setting("DRY.RUN", False, "Programs run without motion.", "V+"),
         Setting("MESSAGES", True, "TYPE prints.", "VAL-II"),
         Setting("POWER", True, "The arm has power.", "V+"),
+        Setting("TRACE", False, "Each step is told as it's done.", "VAL-II"),
+        Setting("UPPER", False, "Small letters count as capital ones where strings are compared.", "VAL-II"),
     )
 }
 """What ENABLE and DISABLE turn."""

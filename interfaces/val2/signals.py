@@ -114,6 +114,8 @@ class Signals:
         self._seen: list[bool] = []
         self._due: list[float] = []
         self._over: list[float] = []
+        self._pulses: dict[int, float] = {}
+        """When signals turn off that PULSE turned on [s]."""
 
     def on(self, number: float) -> bool:
         """Whether a signal is on; of a negative number, whether it's off.
@@ -145,6 +147,17 @@ class Signals:
         if not 0 <= value <= most or value % 1:
             raise ValError("Illegal value", f"{value:.9g}: 0 to {most} for {len(numbers)} signals")
         self.set(number if int(value) >> i & 1 else -number for i, number in enumerate(numbers))
+
+    def pulse(self, number: float, seconds: float, *, now: float) -> None:
+        """PULSE: turn a signal on, and off after a time [s].
+
+        Raises:
+            ValError: If it's none of those that SIGNAL turns, or the time is negative.
+        """
+        if not 0.0 <= seconds < math.inf:
+            raise ValError("Illegal value", f"{seconds:.9g}: a pulse is 0 s or longer")
+        self.set([abs(number)])
+        self._pulses[abs(int(number))] = now + max(seconds, SOONEST)
 
     def force(self, number: float) -> None:
         """Turn any signal on, or off if negative, inputs too: what a factory does, or a monitor in its stead.
@@ -195,7 +208,12 @@ class Signals:
     def advance(self, *, now: float) -> None:
         """Do what the cell has to do until now, in its order; what it waits for is looked at now."""
         while (t := self.next_deadline()) <= now:
-            if t in self._over:
+            if t in self._pulses.values():
+                over = [number for number, end in self._pulses.items() if end == t]
+                for number in over:
+                    del self._pulses[number]
+                    self._turn(number, on=False)
+            elif t in self._over:
                 i = self._over.index(t)
                 self._over[i] = math.inf
                 self._turn(self._rules[i].signal, on=False)
@@ -207,8 +225,8 @@ class Signals:
         self._watch(now)
 
     def next_deadline(self) -> float:
-        """When the cell next does something [s]; infinity for never."""
-        return min(min(self._due, default=math.inf), min(self._over, default=math.inf))
+        """When the cell next does something, or a pulse ends [s]; infinity for never."""
+        return min((*self._due, *self._over, *self._pulses.values()), default=math.inf)
 
     def _act(self, rule: SignalRule, i: int, t: float) -> None:
         on = self._seen[i] if rule.at_time is None else self._values[i]()
@@ -301,13 +319,3 @@ class Reactions:
         if not reaction.always:
             self._watched.pop(abs(reaction.signal), None)
         return reaction
-
-
-def reaction_to(signal: float, program: str, *, immediate: bool, always: bool) -> Reaction:
-    """A reaction.
-
-    Raises:
-        ValError: If there's no such signal.
-    """
-    legal(signal)
-    return Reaction(int(signal), program, immediate, always)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Final, TypeAlias
@@ -160,6 +160,18 @@ def joined(files: Sequence[SourceFile], program: str = "") -> SourceFile:
         tuple(rule for file in files for rule in file.signals),
         files[0].dialect,
     )
+
+
+def with_called(programs: Mapping[str, Program], some: Mapping[str, Program]) -> dict[str, Program]:
+    """Some programs, and all that they call, or run beside them."""
+    found, waiting = dict(some), list(some.values())
+    while waiting:
+        for step in waiting.pop().steps:
+            name = step.statement.program
+            if name in programs and name not in found:
+                found[name] = programs[name]
+                waiting.append(programs[name])
+    return found
 
 
 def says_dialect(text: str) -> bool:

@@ -1,7 +1,8 @@
-"""Logical units of V+: files of one directory, and the terminal, by numbers.
+"""Logical units of V+: files of one directory, serial lines that are files there, and the terminal, by numbers.
 
-A file is read whole when it's opened, and written whole when it's closed. What can't be done is no error of the
-program: it goes on, and IOSTAT says why. Serial lines, networks and pendants aren't here.
+A file is read whole when it's opened, and written whole when it's closed. What comes over serial line 1 is the file
+`serial1.in`, what goes is `serial1.out`. What can't be done is no error of the program: it goes on, and IOSTAT says
+why. Networks and pendants aren't here.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from interfaces.system import write_whole
 TERMINAL: Final = 4
 DISKS: Final = (5, 6, 7, 8, 17, 18, 19)
 """Units of files."""
+LINES: Final = range(10, 16)
+"""Units of serial lines."""
 OURS: Final = 4
 """Bit of ATTACH's mode: the unit's number is given back."""
 DONE: Final = 1.0
@@ -30,6 +33,7 @@ MESSAGES: Final = {
 """What IOSTAT gives where something couldn't be done, and $ERROR of it."""
 LARGEST: Final = 4_000_000
 """Longest file [characters]."""
+_SERIAL: Final = re.compile(r"(?:LOCAL\.)?SERIAL:?([0-5])", re.IGNORECASE)
 _NAME: Final = re.compile(r"(?:[A-Za-z]+:)?\\?([A-Za-z0-9_][A-Za-z0-9_.-]{0,99})")
 
 
@@ -43,6 +47,8 @@ class _Unit:
     place: int = 0
     """Up to where it's read [characters]."""
     writes: bool = False
+    sent: str | None = None
+    """What went over a serial line; None of a file."""
 
 
 class Units:
@@ -66,9 +72,13 @@ class Units:
 
     def attach(self, unit: int | None, device: str) -> int:
         """ATTACH a unit, or the first that's free for None; its number, 0 where none is."""
-        disk = device.upper().rstrip(":") in ("", "DISK", "SYSTEM", "A", "C", "D")
+        if (line := _SERIAL.fullmatch(device)) is not None and self.directory is not None:
+            return self._attach_line(LINES[int(line[1])] if unit is None else unit, f"serial{line[1]}")
+        disk = device.upper().rstrip(":") in ("", "DISK", "NFS", "SYSTEM", "A", "C", "D")
         if not disk or (unit is not None and unit not in (TERMINAL, *DISKS)):
-            self.warn(f"ATTACH {device or unit}: only files and the terminal are here, no serial line or pendant")
+            self.warn(
+                f"ATTACH {device or unit}: allowed: DISK, SERIAL:n with --files, and the terminal, {TERMINAL}"
+            )
             self._status[unit or 0] = NOT_READY
             return unit or 0
         free = [number for number in DISKS if number not in self._units]
@@ -80,6 +90,16 @@ class Units:
             self._units.setdefault(number, _Unit())
             self._status[number] = DONE
         return number
+
+    def _attach_line(self, unit: int, name: str) -> int:
+        assert self.directory is not None
+        text = self._read(self.directory / f"{name}.in")
+        if text is None:
+            self.warn(f"ATTACH of a serial line: what comes is read from {name}.in, which isn't in --files DIR")
+        else:
+            self._units[unit] = _Unit(self.directory / f"{name}.out", text, writes=True, sent="")
+        self._status[unit] = NOT_READY if text is None else DONE
+        return unit
 
     def detach(self, unit: int) -> None:
         """DETACH: close what is open, too."""
@@ -113,7 +133,8 @@ class Units:
         if path in self._written:
             return self._written[path]
         try:
-            if path.resolve().parent != path.parent.resolve() or path.stat().st_size > LARGEST:
+            inside = path.is_file() and path.resolve().parent == path.parent.resolve()
+            if not inside or path.stat().st_size > LARGEST:
                 return None
             return path.read_text("utf-8", errors="replace").replace("\r\n", "\n")
         except OSError:
@@ -125,7 +146,8 @@ class Units:
         if known is None or known.path is None:
             self._status[unit] = NOT_OPEN
             return
-        self._status[unit] = self._write(known.path, known.text) if known.writes else DONE
+        text = known.text if known.sent is None else known.sent
+        self._status[unit] = self._write(known.path, text) if known.writes else DONE
         self._units[unit] = _Unit()
 
     def delete(self, unit: int, name: str) -> None:
@@ -178,6 +200,9 @@ class Units:
         known = self._units.get(unit)
         if known is None or known.path is None or not known.writes:
             self._status[unit] = NOT_OPEN
+        elif known.sent is not None and len(known.sent) + len(text) <= LARGEST:
+            known.sent += text
+            self._status[unit] = self._write(known.path, known.sent)
         elif len(known.text) + len(text) > LARGEST:
             self._status[unit] = NOT_READY
         else:

@@ -261,11 +261,11 @@ def _instruction(state: TerminalState, before: str, *, alone: bool = False) -> I
     elif keyword == "PARAMETER" and "=" not in before:
         yield from _rows(forms.PARAMETERS)(state, before)
     else:
-        if keyword in {"CALL", "GOSUB", "REACT", "REACTI"}:
-            yield from _programs(state, before)
         if keyword in forms.INSTRUCTIONS:
-            words = forms.INSTRUCTIONS[keyword].allowed_words
-            yield from (Word(one, forms.WORDS.get(one, "")) for one in words)
+            row = forms.INSTRUCTIONS[keyword]
+            if row.rule in ("call", "tasks") or "program" in (slot.kind for slot in row.slots):
+                yield from _programs(state, before)
+            yield from (Word(one, forms.WORDS.get(one, "")) for one in row.allowed_words)
         yield from _operands(state, before)
 
 
@@ -353,6 +353,10 @@ _KINDS: Final = (
 _TABLE: Final = (
     MonitorCommand("ABORT", running.abort, "| task",
                    "Stop the program and the arm, within its limits; Ctrl-C does the same.", short="A"),
+    *(MonitorCommand(word, partial(running.channel, word=word), f"| {name} | {name}=value",
+                     f"Show {what}, or set one.", _ARGUMENT, _until("=", _none, _operands))
+      for word, name, what in (("ADC", "channel", "analogue inputs"), ("DAC", "channel", "analogue outputs"),
+                               ("IOGET", "port", "ports that are read"), ("IOPUT", "port", "ports that are set"))),
     MonitorCommand("AT", running.at, "t | +t [motion]",
                    "The next motion begins at a time, or so long from now [s].", completes=_motion, idle=True,
                    ours=True),

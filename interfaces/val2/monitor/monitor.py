@@ -262,6 +262,8 @@ class TerminalMonitor:
         match event:
             case context.Typed(text):
                 state.output.append(OutputText(text, Style.TYPED))
+            case context.Traced(program, step, text):
+                state.say(f"{program} {step}: {text}", style=Style.NOTE)
             case context.Asked(text):
                 self._prompted = text
             case context.ProgramPaused(program, step, word, 0):

@@ -249,6 +249,18 @@ def io(state: TerminalState, _rest: str) -> None:
                 state.say(f"{title:8}  {row[0]:4} {eights} {row[-1]}")
 
 
+def channel(state: TerminalState, rest: str, *, word: str) -> None:
+    """ADC, DAC, IOGET, IOPUT: simulated channels; what programs read, and what they have set."""
+    known, (given, value) = state.controller.channels[word], halves(rest)
+    if value is not None:
+        known[state.controller.channel(state.number(given))] = state.number(value)
+        return
+    shown = (
+        [state.controller.channel(state.number(given))] if given else [n for n in known if known[n]] or [*known][:1]
+    )
+    state.say(*layout.table([(f"{word} {n}", f"= {layout.number(known[n])}") for n in shown]))
+
+
 def calibrate(state: TerminalState, _rest: str) -> Dialogue:
     """CALIBRATE: the virtual arm knows where it is, so nothing moves."""
     if not state.controller.switches[POWER]:

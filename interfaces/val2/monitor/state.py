@@ -268,7 +268,7 @@ class TerminalState:
         Raises:
             ValError: If one does.
         """
-        running = [name for name, _ in self.controller.status().stack] if self.controller.running else []
+        running = {name for stack in self.controller.stacks() for name, _ in stack}
         for name in programs:
             if name in running:
                 raise ValError("Program in use", name)

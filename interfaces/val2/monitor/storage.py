@@ -15,8 +15,8 @@ from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, named, nothing, pieces
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
-from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file
-from interfaces.val2.syntax import Instruction, Program, Variable
+from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file, with_called
+from interfaces.val2.syntax import Program, Variable
 from interfaces.val2.values import PrecisionPoint, Transformation, Value
 
 T = TypeVar("T")
@@ -148,7 +148,7 @@ def _loading(state: TerminalState, name: str, text: str) -> Generator[int, None,
     """Read a file and take what it holds, in slices."""
     source = yield from read_file(text, name, dialect=state.controller.dialect)
     entries = source.values
-    if len(entries) > MOST_MEANWHILE and state.controller.running:
+    if len(entries) > MOST_MEANWHILE and state.controller.busy:
         raise ValError("Program running", f"LOAD of more than {MOST_MEANWHILE} values must wait, or ABORT it")
     state.refuse_in_use(*(program.name for program in source.programs))
     memory = state.controller.memory
@@ -209,7 +209,7 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
     if parts in {"", "programs"}:
         programs = dict(memory.programs)
         if names:
-            programs = _called(programs, chosen(programs, names, _WORDS["programs"]))
+            programs = with_called(programs, chosen(programs, names, _WORDS["programs"]))
             used = {variable.name for variable in _variables(tuple(programs.values()))}
     values = {}
     for kind in _TYPES:
@@ -227,18 +227,6 @@ def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:
     """Variables of a kind, by how they're written."""
     entries = (NamedValue(*one) for one in memory.variables())
     return {layout.variable(e.variable): e for e in entries if isinstance(e.value, _TYPES[kind])}
-
-
-def _called(programs: dict[str, Program], some: dict[str, Program]) -> dict[str, Program]:
-    """Programs with all that they call."""
-    found, waiting = dict(some), list(some.values())
-    while waiting:
-        for step in waiting.pop().steps:
-            name = step.statement.program if isinstance(step.statement, Instruction) else ""
-            if name in programs and name not in found:
-                found[name] = programs[name]
-                waiting.append(programs[name])
-    return found
 
 
 def _variables(node: object) -> Iterator[Variable]:

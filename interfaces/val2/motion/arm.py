@@ -514,7 +514,7 @@ class Arm(SettingsInForce):
             command = MotionCommand(
                 target=PoseTarget(self._frames.pose(target))
                 if straight and isinstance(target, Transformation)
-                else JointTarget(self._frames.solve(target, near, manner.words)),
+                else JointTarget(self._solved(target, near, manner)),
                 execute_at=self._start(now),
                 speed=self._speed_share(target, straight, near, manner.speed if speed is None else speed),
                 motion=Motion.LINE if straight else Motion.JOINT,
@@ -539,6 +539,13 @@ class Arm(SettingsInForce):
             self._hand.begin(self._begins, now)
         self._last_settings, self._delay, self._at = manner, None, None
         self.next = self.always if turns else replace(self.always, words=words)
+
+    def _solved(self, target: Location, near: Array, manner: MotionSettings) -> Array:
+        q = self._frames.solve(target, near, manner.words)
+        if manner.single and isinstance(target, Transformation):
+            q = np.array(q)
+            q[5] = math.remainder(q[5], 2.0 * math.pi)
+        return q
 
     def _start(self, now: float) -> float | None:
         """When the next motion is to begin [s]; None for as soon as it can."""

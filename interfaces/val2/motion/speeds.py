@@ -84,6 +84,8 @@ class MotionSettings:
     """Whether its end waits for the other twin."""
     words: tuple[str, ...] = ()
     """What is asked for of the configuration."""
+    single: bool = False
+    """Whether joint 6 stays within half a turn, of a joint-interpolated motion to a transformation."""
     hand: float | bool | None = None
     """What the hand does as it begins: an opening [mm], open or closed; None for nothing."""
     relaxes: bool = False
@@ -103,6 +105,10 @@ class SettingsInForce:
     def set_configuration(self, word: str) -> None:
         """RIGHTY, LEFTY, ABOVE, BELOW, FLIP, NOFLIP: at the next joint-interpolated motion to a transformation."""
         self._change(False, words=with_word(self.next.words, word))
+
+    def set_turns(self, single: bool, always: bool) -> None:
+        """SINGLE, MULTIPLE."""
+        self._change(always, single=single)
 
     def _change(self, always: bool, **changes: object) -> None:
         self.next = replace(self.next, **changes)  # type: ignore[arg-type]

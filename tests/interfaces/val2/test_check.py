@@ -243,6 +243,19 @@ def test_vrs_check_plans_the_first_program(tmp_path, capsys):
     assert capsys.readouterr().out == "no errors, no warnings.\n"
 
 
+def test_vrs_check_plans_a_program_beside_one_that_is_wrong(tmp_path, capsys):
+    path = tmp_path / "two.v2"
+    path.write_text(
+        ".PROGRAM a\n  MOVE p\n.END\n.PROGRAM b\n  CALL c\n.END\n.PROGRAM c\n  MOVE TRANS(5000)\n.END\n"
+    )
+    assert exit_code("check", str(path), "--program", "b") == 2
+    said = capsys.readouterr().out
+    assert "*Undefined location* p" in said
+    assert "*Location out of range*" in said
+    assert exit_code("check", str(path)) == 2
+    assert "*Location out of range*" not in capsys.readouterr().out
+
+
 def test_vrs_check_takes_programs_and_values_of_several_files(tmp_path, capsys):
     program, values, other = (tmp_path / name for name in ("a.v2", "b.lc", "c.v2"))
     program.write_text(".PROGRAM main\n  MOVE p\n  CALL other(x)\n.END\n")

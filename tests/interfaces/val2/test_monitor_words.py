@@ -83,7 +83,9 @@ def test_each_row_has_a_wrong_use_words_that_may_follow_and_its_short_forms(sitt
     assert sitting.monitor.prompt == "."
     sitting.type("ENABLE POWER", *HELLO, "DO x = 1", "DO SET p = NULL", 'DO $s = "a"', "STORE f")
     _, words = sitting.monitor.suggestions(f"{row.name} ")
-    takes_words = row.forms not in {"", "| n", "| task"} or (row.more and row.name == "DIRECTORY")
+    takes_words = row.forms not in {"", "| n", "| task", "| channel | channel=value", "| port | port=value"} or (
+        row.more and row.name == "DIRECTORY"
+    )
     assert bool(words) == bool(takes_words)
     for short in row.short.split():
         assert command(short) is row

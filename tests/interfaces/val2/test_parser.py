@@ -249,7 +249,7 @@ def test_words_are_keywords_only_where_they_can_stand():
         ("IF a GOTO x", 11, "allowed: a number"),
         ("ELSEIF x", 1, "ELSE on a line"),
         ("BREAK 3", 7, "*Too many arguments* allowed: BREAK"),
-        ("RETURN x", 8, "*Too many arguments* allowed: RETURN"),
+        ("RETURN 1, 2", 11, "*Too many arguments* allowed: RETURN [skipped]"),
         ("CALL 3", 6, "allowed: the name of a program"),
         ("CALL #p", 6, "the name of a program"),
         ("REACT 1001, $x", 13, "the name of a program"),

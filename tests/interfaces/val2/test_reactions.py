@@ -7,7 +7,7 @@ import pytest
 from interfaces.val2.context import ProgramEnded
 from interfaces.val2.errors import ValError
 from interfaces.val2.interpreter import ProgramState
-from interfaces.val2.signals import Reactions, reaction_to
+from interfaces.val2.signals import Reaction, Reactions
 from tests.interfaces.val2.rig import FakeArm, Rig, body
 
 ALARM = ".PROGRAM alarm()\n TYPE TIMER(0)\n.END\n"
@@ -116,7 +116,7 @@ def test_ignore() -> None:
 
 def test_what_turned_waits_once_and_is_forgotten_with_ignore() -> None:
     watched = Reactions()
-    watched.add(reaction_to(1001, "alarm", immediate=False, always=True))
+    watched.add(Reaction(1001, "alarm", immediate=False, always=True))
     for on in (True, False, True):
         watched.notice(1001, on)
     due = watched.due(0)

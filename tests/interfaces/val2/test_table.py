@@ -120,7 +120,7 @@ def test_the_programs_compile(path: Path) -> None:
     assert [one for one in check_text(path.read_bytes().decode(), path.name)[1] if one.severity == "error"] == []
 
 
-@pytest.mark.parametrize("stem", ["motions", "functions", "files", "tasks", "angles"])
+@pytest.mark.parametrize("stem", ["motions", "functions", "files", "tasks", "angles", "process"])
 def test_programs_that_are_there_for_their_words_run(stem: str) -> None:
     text = (HERE / "programs" / f"{stem}.v2").read_text()
     assert rehearse(parse_file(text, stem), puma560.model()).findings == ()

@@ -35,7 +35,9 @@ def test_a_program_writes_a_file_and_reads_it_again(tmp_path: Path) -> None:
         " -7 2.5\n",
         "done\n",
     ]
-    assert warned == ["ATTACH SERIAL:1: only files and the terminal are here, no serial line or pendant"]
+    assert warned == [
+        "ATTACH of a serial line: what comes is read from serial1.in, which isn't in --files DIR",
+    ]
     assert [*tmp_path.iterdir()] == []
 
 
@@ -87,6 +89,19 @@ def test_a_line_that_isnt_what_was_wanted_leaves_variables_alone(tmp_path: Path)
     (tmp_path / "a.txt").write_text("word\n")
     steps = 'x = 7; ATTACH (lun, 4) "DISK"; FOPENR (lun) "a.txt"; READ (lun) x; TYPE x, IOSTAT(lun)'
     assert typed(programs(main=steps), tmp_path)[0] == [" 7 -517\n"]
+
+
+def test_a_serial_line_is_a_file_for_what_comes_and_one_for_what_goes(tmp_path: Path) -> None:
+    (tmp_path / "serial1.in").write_text("3, 4\nx")
+    units = Units(tmp_path)
+    assert units.attach(None, "serial:1") == 11
+    units.write(11, "Ready\n")
+    assert units.read(11) == "3, 4"
+    units.write(11, "ok")
+    assert (tmp_path / "serial1.out").read_text() == "Ready\nok"
+    assert [units.character(11), units.character(11)] == [ord("x"), -504]
+    steps = 'ATTACH (s, 4) "SERIAL:1"; READ (s) a, b; WRITE (s) a + b; TYPE a, b; READ (s) c; TYPE IOSTAT(s)'
+    assert typed(programs(main=steps), tmp_path)[0] == [" 3 4\n", " -517\n"]
 
 
 def test_the_terminal_is_unit_4() -> None:
