@@ -15,14 +15,14 @@ from interfaces.val2.motion.remote import RemoteRobot
 from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from interfaces.val2.values import Transformation, from_oat
+from interfaces.val2.values import Transformation
 from robots import load
 from robots.robot import exact_arm
 from tests.interfaces.joined import constant
 from tests.vrs.test_altering import check_limits
 from vrs.planning.altering import DELAY, FADE
 
-from .bench import DOWN, MODEL, Bench
+from .bench import DOWN, MODEL, Bench, from_oat
 from .sitting import Sitting
 from .test_remote import Line
 
