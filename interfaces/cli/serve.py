@@ -330,6 +330,7 @@ async def _serve(serving: _Serving, access: Access) -> None:
             assert isinstance(operator.twins, ArmTwins)
             client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
             room = served_room(client, operator.twins.operator, val.files, software())
+            operator.hub.alterer = room
             routes.append(PageTerminalServer(room, access).route)
         app = application([*routes, *station.routes], serving.allowed(port))
         for part in (station.running(), sockets.serve(app, listening), *parts):
