@@ -7,9 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from interfaces.cli import main
 from interfaces.link import delay_profile
 from interfaces.messages.control import Corrected, PathCorrection, ProblemCode
 from interfaces.messages.fields import Epoch
+from interfaces.recording.recording import open_recording
+from interfaces.recording.rerun import rerun
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.motion import Arm
@@ -24,6 +27,7 @@ from robots import load
 from robots.robot import exact_arm
 from tests.interfaces.joined import constant
 from tests.vrs.test_altering import check_limits
+from vrs import Alter
 from vrs.planning.altering import DELAY, FADE
 
 from .bench import DOWN, MODEL, Bench
@@ -195,6 +199,22 @@ def test_a_program_alters_its_own_motion_on_both_twins(mode, delay):
     stays = abs(typed[2] - 150) > 1
     assert stays is bool(mode & 1)
     assert typed[3:] == pytest.approx([-100, 450, 120], abs=1e-4)
+
+
+def test_a_recording_of_it_opens_plays_and_makes_the_same_again(tmp_path):
+    (tmp_path / "a.v2").write_text(
+        PROGRAM.format(begin=WAYS[3][0], correct=WAYS[3][1], end=WAYS[3][2], amplitude=5)
+    )
+    with pytest.raises(SystemExit) as exited:
+        main(["run", str(tmp_path / "a.v2"), "--delay", "mon", "--out", str(tmp_path), "--seed", "1"])
+    assert not exited.value.code
+    with open_recording(tmp_path / "run.mcap") as recording:
+        again = rerun(recording)
+        assert (again.difference, again.missing) == ("", "")
+        assert again.identical
+        commands = [entry.command for entry in recording.commands]
+        assert sum(isinstance(command, Alter) for command in commands) > 60
+        check_limits(recording.edits[-1].timeline)
 
 
 def test_a_motion_that_follows_is_altered_too():
