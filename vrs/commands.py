@@ -373,7 +373,7 @@ class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
     tool: Pose | None = None
     """What is offset: a frame in the last link's, (4, 4), by rows; None: that link."""
     stays: bool = False
-    """Whether it stays where the plan is over by then."""
+    """Whether it stays where the plan is over by then; else it's stayed at 0.1 s longer before it goes back."""
     issued_at: Time | None = None
     """Issue time t_iss [s], from which its delay counts; one older than 0.2 s moves nothing."""
     execute_at: Time | None = None
@@ -381,11 +381,8 @@ class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
 
     def __post_init__(self) -> None:
         if self.offset is not None:
-            allowed = "a translation [m] and a rotation vector [rad] no longer than π, (6,)"
-            offset = sized_array("offset", self.offset, (6,), allowed)
-            if np.sqrt(offset[3:] @ offset[3:]) > np.pi:
-                raise InvalidValueError("offset", self.offset, allowed)
-            set_field(self, "offset", offset)
+            allowed = "a translation [m] and a rotation vector [rad], (6,)"
+            set_field(self, "offset", sized_array("offset", self.offset, (6,), allowed))
         if self.tool is not None:
             set_field(self, "tool", _transform("tool", self.tool))
         set_field(self, "frame", word("frame", self.frame, Frame))

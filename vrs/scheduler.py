@@ -493,9 +493,13 @@ class Scheduler(BaseScheduler[Timeline]):
         Raises:
             PlanningError: If it's too old, or the limits leave no room for it; what was in force goes on then.
         """
+        begins, given = now if command.execute_at is None else command.execute_at, command.issued_at
+        if given is not None and begins is not None and given > begins:
+            # A clock that's ahead of this one says for when it's meant, not when it begins.
+            command = replace(command, issued_at=begins)
         moment = self.moment(command, now, self.timeline.end)
         t = moment.t
-        given = t if moment.issued is None else moment.issued
+        given = t if given is None else given
         if t - given >= FRESH:
             raise PlanningError(f"the offset is {t - given:.3g} s old; it moves nothing from {FRESH} s on")
         before, known = self.timeline, self._offset_at(t)
@@ -560,7 +564,7 @@ class Scheduler(BaseScheduler[Timeline]):
         task = altering.Task(known.frame, known.tool, self.model, self.limits)
         made = altering.alter(
             window, timeline.state_before(t), known.course.at(np.array([t]))[0], known.given, task,
-            stays=known.stays and known.planned.end <= ends, jerk=jerk,
+            stays=known.stays, over=known.stays and known.planned.end <= ends, jerk=jerk,
         )  # fmt: skip
         owners = [window.owners[i] or known.command_id for i in made.segments]
         pieces = [

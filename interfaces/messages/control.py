@@ -35,10 +35,11 @@ from interfaces.messages.fields import (
 )
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
+from vrs.checks import sized_array
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import DriveLimits
 from vrs.model import Array, Limits
-from vrs.record import Record
+from vrs.record import Record, Twist, set_field
 
 
 class Ping(Message, frozen=True, omit_defaults=True, gc=False, tag="ping"):
@@ -583,11 +584,41 @@ class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
     """What it reaches ahead and back from its axle, and its width [m]."""
 
 
+class PathCorrection(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="correct"):
+    """Correct the path that a program alters on a channel. The answer is a `Corrected` or a `Problem`."""
+
+    sender: ClassVar[Party] = Party.HOLDER
+    number: Number
+    """The client's own; the answer has it, too."""
+    channel: Annotated[int, Meta(ge=0, le=255)]
+    """Of the program's ALTER."""
+    offset: Twist
+    """Translation [m], then rotation vector [rad], (6,): along which axes, and whether it adds up, says ALTER."""
+    epoch: Epoch
+    at: Time | None = None
+    """For when it's meant [s], within 0.2 s of now; absent: for when it comes."""
+
+    def __post_init__(self) -> None:
+        allowed = "a translation [m] and a rotation vector [rad], (6,)"
+        set_field(self, "offset", sized_array("offset", self.offset, (6,), allowed))
+        super().__post_init__()
+
+
+class Corrected(Message, frozen=True, omit_defaults=True, gc=False, tag="corrected"):
+    """A correction is on the path."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    number: Number
+    """Of the `PathCorrection`."""
+    late: Text = ""
+    """What keeps the arm from following in time; empty where nothing does."""
+
+
 LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume
 """What a client asks of the lease; a `Lease` or a `Problem` answers it."""
-Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem
+Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem | PathCorrection
 """Control messages that a client sends."""
-Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network
+Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | Corrected
 """Control messages that a server sends."""
 
 

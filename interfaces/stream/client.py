@@ -49,11 +49,11 @@ UNKNOWN = "unknown: the session was lost before an answer came"
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
-Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder
+Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder | control.PathCorrection
 """What a client may wish for."""
 Ask: TypeAlias = Callable[[int], Asked]
 """Makes a wish of its number."""
-Replied: TypeAlias = control.Lease | control.Problem | Network | Tasks
+Replied: TypeAlias = control.Lease | control.Problem | control.Corrected | Network | Tasks
 """What answers one."""
 
 _COMING = Reply | Notice | Welcomed | News
@@ -222,6 +222,8 @@ class ClientCore:
             self._note(message, now)
         elif isinstance(message, control.Problem):
             self._complain(message)
+        elif isinstance(message, control.Corrected):
+            self._settle(message.number, message)
         elif isinstance(message, News):
             self.newest[type(message)] = message
             if isinstance(message, Network | Tasks):

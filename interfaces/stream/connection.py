@@ -9,16 +9,21 @@ from functools import partial
 from types import TracebackType
 from typing import Self, TypeVar
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from interfaces.clients.designer import Issued
 from interfaces.clients.viewer import ShownFrame, Viewer
 from interfaces.link.clock_sync import ClockEstimate
 from interfaces.messages import ViewForm, control
 from interfaces.messages.control import (
+    Corrected,
     DirectionConditions,
     Impair,
     Lease,
     MobileWelcome,
     Network,
+    PathCorrection,
     Plan,
     Postures,
     Problem,
@@ -226,6 +231,26 @@ class Connection:
     def stop(self, *, wait: float = 0.0) -> Issued:
         """Stop both robots, and what a mobile one does by itself."""
         return self.designer.issue(Stop(), wait=wait)
+
+    def correct(
+        self, channel: int, offset: ArrayLike, *, at: float | None = None, wait: float = 1.0
+    ) -> Corrected | Problem:
+        """Correct the path that a program at the server's terminals alters: VAL-II's ALTER.
+
+        Args:
+            channel: Of the program's ALTER.
+            offset: Translation [m] and rotation vector [rad], (6,); see `PathCorrection`.
+            at: For when it's meant [session time, s]; None: for when it comes.
+            wait: How long to wait for the answer [s].
+
+        Returns:
+            That it's on the path, and what keeps the arm from following in time; or why it isn't.
+        """
+
+        def ask(number: int) -> PathCorrection:
+            return PathCorrection(number, channel, np.asarray(offset, float), self._epoch, at)
+
+        return self._ask(Corrected, ask, wait, leased=True)
 
     def go(self, goal: Goal, *, wait: float = 5.0) -> Tasks | Problem:
         """Send the robot to a goal.

@@ -19,8 +19,10 @@ from interfaces.engine_server.site import Site, earliest
 from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Want, control
 from interfaces.messages.control import (
     PROTOCOL,
+    Corrected,
     Impair,
     Network,
+    PathCorrection,
     Ping,
     Pong,
     Postures,
@@ -38,6 +40,7 @@ from interfaces.stream.leasing import LeasedRobot, Leasing, SessionState, Wish
 from interfaces.stream.limits import Allowance, Allowances, Bucket, ClientLimits, Outbox
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
+from vrs.model import Array
 
 POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 """Close codes of WebSocket (RFC 6455, and IANA's registry)."""
@@ -100,6 +103,26 @@ class Workers(Protocol):
 
     def tasks(self, answers: int | None = None) -> Tasks:
         """How it is."""
+
+
+class PathAlterer(Protocol):
+    """What lets clients correct the path of a program that asks for that."""
+
+    def correct(self, channel: int, offset: Array, at: float, *, now: float) -> str:
+        """Correct it.
+
+        Args:
+            channel: Of the program's.
+            offset: As in `PathCorrection`.
+            at: For when it's meant [s].
+            now: Session time [s].
+
+        Returns:
+            What keeps the arm from following in time; empty where nothing does.
+
+        Raises:
+            VrsError: If no program alters its path on that channel, or it can't be.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +260,8 @@ class HubSession:
             self._survey(seat, message, now)
         elif isinstance(message, TaskOrder):
             self.outbox.put(self.hub.task(seat, message, now))
+        elif isinstance(message, PathCorrection):
+            self.outbox.put(self.hub.correct(seat, message, now))
 
     def _survey(self, seat: SessionState, message: Survey | Impair, now: float) -> None:
         """Tell how the way to the robot is, after it was changed where that was asked for."""
@@ -413,6 +438,8 @@ class Hub:
             for rate in self.config.rates:
                 site.broadcast(rate)
         self._workers = workers
+        self.alterer: PathAlterer | None = None
+        """What a client's corrections of the path go to; None where no programs run."""
         self.news: dict[type, tuple[int, News]] = {}
         """What every client is told when it changes, by its kind, with its version."""
         self.news_version = 0
@@ -659,3 +686,19 @@ class Hub:
         if refusal:
             return Problem(ProblemCode.OUT_OF_RANGE, refusal, order.number)
         return self._workers.tasks(order.number)
+
+    def correct(self, seat: SessionState, wish: PathCorrection, now: float) -> Corrected | Problem:
+        """Let who commands correct the path of a program that asks for that; or say why not."""
+        if not may_send(seat.role, wish.sender):
+            return Problem(ProblemCode.NOT_ALLOWED, "a viewer corrects nothing", wish.number)
+        leasing = self.leasing
+        if not leasing.commanding(seat) or leasing.lease.refused(wish.epoch, now=now) is not None:
+            text = "only who has control, or shares it, corrects the path"
+            return Problem(ProblemCode.STALE_EPOCH, text, wish.number)
+        if self.alterer is None:
+            return Problem(ProblemCode.NOT_ALLOWED, "no program alters its path here", wish.number)
+        try:
+            late = self.alterer.correct(wish.channel, wish.offset, now if wish.at is None else wish.at, now=now)
+        except VrsError as error:
+            return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
+        return Corrected(wish.number, late)

@@ -122,7 +122,9 @@ def resolved(command: Command, answer: Receipt, now: float) -> Command:
         return replace(command, target=target, issued_at=issued, execute_at=when)
     if isinstance(command, (Cancel, InsertVia)) and command.execute_at is None:
         return replace(command, issued_at=issued, execute_at=max(now, issued))
-    if isinstance(command, (SteerCommand, Alter)):
+    if isinstance(command, Alter):
+        return replace(command, issued_at=issued, execute_at=max(now, command.execute_at or now))
+    if isinstance(command, SteerCommand):
         return replace(command, issued_at=issued, execute_at=max(now, issued, command.execute_at or now))
     if isinstance(command, (ScaleTime, Stop, Resume)):
         return replace(command, issued_at=issued, execute_at=answer.execute_at)

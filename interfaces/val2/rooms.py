@@ -6,17 +6,22 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
+import numpy as np
+
 from interfaces.messages.control import Role
 from interfaces.stream.access import Access
 from interfaces.stream.local import LocalClient
 from interfaces.timer import Turning
 from interfaces.val2.controller import Controller
+from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.control import ServedControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.parser import parse_expression
 from vrs.clock import Clock
+from vrs.model import Array
+from vrs.scheduler import FRESH
 
 if TYPE_CHECKING:
     from interfaces.teleop import OperatorSite
@@ -74,6 +79,24 @@ class TerminalRoom:
         if read_only and access.refusal(Role.VIEWER, token):
             return None
         return TerminalMonitor(self._shared, self._files, self._version, read_only=read_only, session=session)
+
+    def correct(self, channel: int, offset: Array, at: float, *, now: float) -> str:
+        """Correct the path of the program that alters it on a channel; see `interfaces.stream.hub.PathAlterer`.
+
+        Raises:
+            ValError: If none does, or it can't be.
+        """
+        arm = self._shared.controller.arm
+        if not arm.altering(channel, now=now):
+            raise ValError("Path isn't altered", f"no program has ALTER on for channel {channel}")
+        if abs(at - now) > FRESH:
+            raise ValError("Illegal value", f"a correction is for now, within {FRESH:g} s")
+        values = (*(1000.0 * offset[:3]).tolist(), *np.degrees(offset[3:]).tolist())
+        outcome = arm.correct(values, given=at, now=now)
+        self.soon()
+        if outcome is None or outcome.receipt is None or outcome.reason:
+            raise ValError("Path can't be altered so", "" if outcome is None else outcome.reason)
+        return outcome.receipt.hindrance
 
     def join(self, terminal: RoomTerminal) -> None:
         """Move a terminal on from now."""

@@ -28,6 +28,8 @@ PROMPT = 0.028
 """Offsets of which one comes later than this after it was given [s] count from then on so much later."""
 FADE = 0.4
 """How long an offset that isn't renewed takes to go back to nothing, at least [s]."""
+LINGER = 0.1
+"""How long one that's to stay is stayed at before that [s]."""
 _LONGER = (1.0, 2.0, 4.0)
 """How much longer that may take where the limits ask for it."""
 _LATER = (0.09, 0.16, 0.3, 0.6, 1.4)
@@ -139,7 +141,7 @@ def remembered(given: Sequence[Given], value: Array, t: float) -> tuple[Given, .
 
 
 def _ways(
-    t: float, state: Array, given: Sequence[Given], stays: bool
+    t: float, state: Array, given: Sequence[Given], stays: bool, over: bool
 ) -> Iterator[tuple[Course, Sequence[Course], bool]]:
     """Ways of an offset from a state on, the one that's asked for first; how each may end; whether it's late.
 
@@ -147,7 +149,8 @@ def _ways(
         t: When they begin [s].
         state: Offset, rate, acceleration at t, (3, 6).
         given: What was given, the newest last.
-        stays: Whether it comes to rest at the newest; else it goes back to nothing.
+        stays: Whether it comes to rest at the newest.
+        over: Whether it stays there for good then; else it goes back to nothing.
     """
     rest = np.zeros((3, 6))
     rest[0] = given[-1][1]
@@ -158,12 +161,19 @@ def _ways(
         knots = np.array([t, *(when for when, _ in through)])
         passed = np.stack([state, *(there for _, there in through)])
         course = Course(knots, quintics(np.diff(knots), passed[:-1], passed[1:]))
-        goal = rest if stays else np.zeros((3, 6))
+        # One that's to stay comes to rest first, even where it goes back after that.
+        leads = [] if not stays or np.array_equal(rest, passed[-1]) else [(LINGER, rest)]
         ends: list[Course] = []
-        if not np.array_equal(goal, passed[-1]):
-            for h in (FADE * longer for longer in _LONGER):
-                leading = quintics(np.array([h]), passed[-1:], goal[None])
-                ends.append(Course(np.array([knots[-1], knots[-1] + h]), leading))
+        for h in (FADE * longer for longer in _LONGER):
+            led = leads if over else [*leads, (h, np.zeros((3, 6)))]
+            if not led or (not stays and not passed[-1].any()):
+                break
+            there = np.stack([passed[-1], *(state for _, state in led)])
+            lasts = np.array([lasting for lasting, _ in led])
+            marks = knots[-1] + np.concatenate([[0.0], np.cumsum(lasts)])
+            ends.append(Course(marks, quintics(lasts, there[:-1], there[1:])))
+            if over:
+                break
         yield course, ends, through[-1] is not wanted[-1]
 
 
@@ -204,12 +214,20 @@ class Task(NamedTuple):
     """In force."""
 
 
-LONGEST = _LATER[-1] + DELAY + FADE * _LONGER[-1]
+LONGEST = _LATER[-1] + DELAY + LINGER + FADE * _LONGER[-1]
 """No course lasts longer [s]."""
 
 
 def alter(
-    window: Window, start: State, offset: Array, given: Sequence[Given], task: Task, *, stays: bool, jerk: bool
+    window: Window,
+    start: State,
+    offset: Array,
+    given: Sequence[Given],
+    task: Task,
+    *,
+    stays: bool,
+    over: bool,
+    jerk: bool,
 ) -> Altered:
     """Go on from now with offsets that were given.
 
@@ -219,7 +237,8 @@ def alter(
         offset: Offset, rate, acceleration now, (3, 6).
         given: What was given, the newest last.
         task: What it is to the arm.
-        stays: Whether the offset comes to rest at the newest; else it goes back to nothing.
+        stays: Whether the offset comes to rest at the newest.
+        over: Whether it stays there for good then, as nothing else moves the arm; else it goes back to nothing.
         jerk: Whether the jerk limits bind.
 
     Raises:
@@ -227,7 +246,7 @@ def alter(
     """
     found = "no way to it was found"
     model = tooled(task.model, task.tool)
-    for head, ends, late in _ways(float(window.starts[0]), offset, given, stays):
+    for head, ends, late in _ways(float(window.starts[0]), offset, given, stays, over):
         for end in ends or (None,):
             course = (
                 head

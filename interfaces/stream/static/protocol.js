@@ -363,6 +363,15 @@ function checkNetwork(m) {
   return m;
 }
 
+/** Server: A correction is on the path. */
+function checkCorrected(m) {
+  map(m, "corrected");
+  if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
+  whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
+  m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
+  return m;
+}
+
 /** How fast a mobile robot may be commanded, and how fast that may change. */
 function checkDriveLimits(m) {
   map(m, "DriveLimits");
@@ -595,6 +604,7 @@ const CHECKS = new Map([
   ["lease", checkLease],
   ["state", checkState],
   ["network", checkNetwork],
+  ["corrected", checkCorrected],
   ["mobile-welcome", checkMobileWelcome],
   ["postures", checkPostures],
   ["tasks", checkTasks],
@@ -603,7 +613,7 @@ const CHECKS = new Map([
 ]);
 
 /** Types of messages that bear the epoch of the lease under which they're sent. */
-export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "task"]);
+export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "correct", "task"]);
 
 const told = new Set();
 

@@ -53,7 +53,7 @@ _ELSEWHERE: Final = 1e-5
 """Joints of an end that differ by more from the destination [rad]."""
 _RECENT: Final = 4
 """Motions that may be interrupted at once: the one under way, and what is asked for ahead."""
-_RENEWAL: Final = 0.05
+_RENEWAL: Final = 0.084
 """After how long corrections that add up are asked for again [s], before they'd begin to go back."""
 _ALTERED_SPEED: Final = 0.8
 """Share of the nominal speeds that a motion takes at most while ALTER is on."""
@@ -485,8 +485,9 @@ class Arm(SettingsInForce):
             return None
         return self._add(offset, given, now)
 
-    def altering(self, channel: int) -> bool:
+    def altering(self, channel: int, *, now: float) -> bool:
         """Whether the path is altered by corrections that come on a channel."""
+        self.renew(now=now)
         alterations = self._alterations
         over = alterations.ends and self._now >= self._arrival()
         return alterations.mode is not None and not over and alterations.channel == channel

@@ -225,6 +225,7 @@ RULES: tuple[tuple[set[str], Rule], ...] = (
     ({"q", "falsified"}, _base64),
     ({"X"}, _pose),
     ({"tool", "speed"}, _pose),
+    ({"tool", "stays"}, _pose),
     ({"rates", "twist"}, _either),
     ({"go", "do", "jobs"}, _one_task),
     ({"jobs", "places"}, _jobs),

@@ -113,6 +113,8 @@ def ordered() -> dict[str, commands.Command | None]:
         "continuous": commands.MotionCommand(
             joints, motion=Motion.LINE, deviation=np.inf, pace=0.25, acceleration=0.5, tool=POSE
         ),
+        "alter": commands.Alter([0.0, 0.0, 0.005, 0.0, 0.0, 0.125], commands.Frame.TOOL, POSE, True, 1.5),
+        "no more offset": commands.Alter(issued_at=1.75),
     }
 
 
@@ -234,6 +236,10 @@ def values() -> dict[str, Any]:
             8, 7_730_941_132_801, c.DirectionConditions("mon", "0.05"), c.DirectionConditions("constant:0.3")
         ),
         "impair one way": c.Impair(9, 7_730_941_132_801, c.DirectionConditions("none", "burst:0.1,3", "in-order")),
+        "correct": c.PathCorrection(10, 1, np.array([0.0, 0.0, 0.005, 0.0, 0.0, 0.125]), LEASE, 2.5),
+        "correct now": c.PathCorrection(11, 0, np.zeros(6), LEASE),
+        "corrected": c.Corrected(10),
+        "corrected late": c.Corrected(11, "the limits don't let the offset be reached in time"),
         "network": c.Network(
             c.DirectionConditions("mon", "0.05"), c.DirectionConditions("none"),
             LinkFigures(412, 0.05, 0.139, 1.9), LinkFigures(300, 0.0, 0.0, 0.0),

@@ -27,6 +27,7 @@ LAST = {
     "07_reacti_stop": "1 stop; at b within  0.00 mm\n",
     "08_palletising": "4 boxes\n",
     "09_speeds": "s\n",
+    "10_alter": "it rose by  5.00 mm, and ended  0.00 mm from b\n",
     "11_tasks": "parts so far\n",
 }
 """How what they TYPE ends."""
