@@ -27,8 +27,7 @@ from interfaces.messages.sites import DriveReport, Report, Sample
 from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.channels import Message
 from interfaces.recording.drives import LiveDrives
-from interfaces.recording.errors import RecordingError
-from interfaces.recording.mcap_file import Sink
+from interfaces.recording.mcap_file import RecordingError, Sink
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events

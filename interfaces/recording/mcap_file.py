@@ -25,8 +25,16 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from interfaces.recording.errors import RecordingError
 from interfaces.recording.mcap_reading import MAGIC, MESSAGE
+from vrs.errors import VrsError
+
+
+class RecordingError(VrsError):
+    """What was to be recorded can't be written any more: a full disk, a file taken away, a wrong order of calls."""
+
+    def __init__(self, where: str, problem: str) -> None:
+        self.where, self.problem = where, problem
+        super().__init__(f"recording failed: {where}: {problem}")
 
 
 class RawFile(Protocol):

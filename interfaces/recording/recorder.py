@@ -12,8 +12,7 @@ from threading import Event, Lock, Thread
 
 from interfaces.messages.recording import Begin, Drop, Dropped, End
 from interfaces.recording.channels import CHANNELS, Message
-from interfaces.recording.errors import RecordingError
-from interfaces.recording.mcap_file import RawFile, Sink
+from interfaces.recording.mcap_file import RawFile, RecordingError, Sink
 from interfaces.recording.mcap_reading import LONGEST
 from interfaces.recording.writer import FLUSH, RecordingWriter, encoded
 from vrs.clock import Clock, WallClock

@@ -30,10 +30,9 @@ from interfaces.messages.recording import (
     RoomEntry,
     RunEvent,
 )
-from interfaces.recording.errors import Damage
 from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit, sampled
 from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
-from interfaces.recording.mcap_reading import NUMBERS, Blocks, FileSource
+from interfaces.recording.mcap_reading import NUMBERS, Blocks, Damage, FileSource
 from interfaces.recording.track import Log, SampleTrack, Tracks
 from robots.robot import BARE, Robot, load, names
 from vrs.errors import FormatError, InvalidValueError

@@ -34,7 +34,7 @@ from interfaces.messages.recording import (
 )
 from interfaces.recording.capture import Capture, link_entry
 from interfaces.recording.channels import Message
-from interfaces.recording.errors import RecordingError
+from interfaces.recording.mcap_file import RecordingError
 from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose, virtual_pose
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness

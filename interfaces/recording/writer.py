@@ -10,8 +10,7 @@ import msgspec
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import FORMAT, Begin, End, SegmentedEntry
 from interfaces.recording.channels import CHANNELS, NUMBER_OF, Message
-from interfaces.recording.errors import RecordingError
-from interfaces.recording.mcap_file import McapFile, RawFile, Sink
+from interfaces.recording.mcap_file import McapFile, RawFile, RecordingError, Sink
 from interfaces.recording.mcap_reading import LONGEST
 from interfaces.recording.poses import nanoseconds
 from vrs.errors import InvalidValueError

@@ -18,7 +18,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import Role
-from interfaces.recording.errors import RecordingError
+from interfaces.recording.mcap_file import RecordingError
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf
 from interfaces.stream.access import Access, bearer

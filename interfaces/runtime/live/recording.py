@@ -9,8 +9,8 @@ from typing import Any
 
 from typing_extensions import override
 
-from interfaces.recording.errors import RecordingError
 from interfaces.recording.live import TURN, LiveRecorder, LiveRecording
+from interfaces.recording.mcap_file import RecordingError
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.teleop.connection import SiteLine
 from vrs.clock import Clock, seconds_since_1970

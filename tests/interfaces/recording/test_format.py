@@ -21,7 +21,7 @@ from interfaces.messages import recording as m
 from interfaces.messages.fields import rich
 from interfaces.recording import RecordingWriter, open_recording
 from interfaces.recording.channels import CHANNELS, RecordingChannel
-from interfaces.recording.errors import RecordingError
+from interfaces.recording.mcap_file import RecordingError
 from interfaces.recording.poses import quaternions
 from interfaces.recording.writer import encoded
 from tests.interfaces.recording import recorded, shown

@@ -10,9 +10,9 @@ import pytest
 
 from interfaces.messages.recording import Begin
 from interfaces.recording.capture import Capture, late_of
-from interfaces.recording.errors import RecordingError
 from interfaces.recording.figures import summary
 from interfaces.recording.live import LiveRecording
+from interfaces.recording.mcap_file import RecordingError
 from interfaces.recording.playback import Align, Playback
 from interfaces.recording.recording import open_recording
 from interfaces.recording.rerun import rerun
