@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.base import MobileBase, box_shape, upright
 from robots.solids import LinkShape
-from vrs.checks import one_of
+from vrs.checks import did_you_mean, one_of
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -318,7 +318,7 @@ def load(what: str) -> Robot:
         allowed = f"one of {', '.join(names())}, or MODULE:NAME of your own"
         if Path(what).suffix.lower() in _FILES or os.sep in what:
             allowed += "; robots aren't read from files yet"
-        raise InvalidValueError("robot", what, allowed)
+        raise InvalidValueError("robot", what, allowed, did_you_mean(what, names()))
     where, _, name = reference.partition(":")
     if own and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())

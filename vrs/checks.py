@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
 import math
 import sys
@@ -138,7 +139,7 @@ def one_of(name: str, value: str, words: Iterable[str], *more: str) -> str:
     """
     allowed = tuple(words)
     if value not in allowed:
-        raise InvalidValueError(name, value, f"one of {', '.join((*allowed, *more))}")
+        raise InvalidValueError(name, value, f"one of {', '.join((*allowed, *more))}", did_you_mean(value, allowed))
     return value
 
 
@@ -158,7 +159,19 @@ def word(name: str, value: Any, kind: type[_WordT]) -> _WordT:
     try:
         return kind(value)
     except ValueError:
-        raise InvalidValueError(name, value, f"one of {', '.join(kind)}") from None
+        raise InvalidValueError(name, value, f"one of {', '.join(kind)}", did_you_mean(value, kind)) from None
+
+
+def did_you_mean(given: object, words: Iterable[str]) -> str:
+    """`; did you mean wed?` of the word that's most like what was given; empty where none is."""
+    close = closest(given, words) if isinstance(given, str) else ""
+    return f"; did you mean {close}?" if close else ""
+
+
+def closest(given: str, words: Iterable[str]) -> str:
+    """The word that's most like what was given, whatever its case; empty where none is like it."""
+    folded = {word.casefold(): word for word in words}
+    return next((folded[one] for one in difflib.get_close_matches(given.casefold(), folded, n=1, cutoff=0.65)), "")
 
 
 def within(low: float, high: float, unit: str = "") -> msgspec.Meta:

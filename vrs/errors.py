@@ -37,9 +37,9 @@ def _again(kind: type[VrsError], args: tuple[object, ...], data: dict[str, objec
 class InvalidValueError(VrsError, ValueError):
     """A value of the wrong type, shape or range."""
 
-    def __init__(self, name: str, given: object, allowed: str) -> None:
+    def __init__(self, name: str, given: object, allowed: str, hint: str = "") -> None:
         self.name, self.given, self.allowed = name, given, allowed
-        super().__init__(f"{name} must be {allowed}; given: {given!r}")
+        super().__init__(f"{name} must be {allowed}; given: {given!r}{hint}")
 
 
 class NonFiniteTimeError(InvalidValueError):

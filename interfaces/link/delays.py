@@ -18,7 +18,7 @@ from typing import Annotated, Protocol, TypeAlias
 import numpy as np
 
 from interfaces.system import read_within
-from vrs.checks import finite, number_in, validated, within
+from vrs.checks import did_you_mean, finite, number_in, validated, within
 from vrs.errors import FormatError, InvalidValueError
 
 MAX_DELAY = 3600.0
@@ -455,6 +455,8 @@ ALLOWED = (
     f"(correlation time in s, {CORRELATION_TIME:g} without it, 0 for independent draws)"
 )
 """What a delay profile may be, in words."""
+KINDS = ("none", "constant", *MEASURED, "gamma", "route", "lunar", "trace")
+"""How a delay profile begins."""
 
 
 def delay_profile(text: str) -> DelayProfile:
@@ -484,7 +486,7 @@ def delay_profile(text: str) -> DelayProfile:
     except InvalidValueError as error:
         raise InvalidValueError("delay profile", text, f"{ALLOWED} ({error})") from None
     except (ValueError, KeyError, TypeError):
-        raise InvalidValueError("delay profile", text, ALLOWED) from None
+        raise InvalidValueError("delay profile", text, ALLOWED, did_you_mean(text, KINDS)) from None
 
 
 def _spelled(text: str, kind: str, argument: str | None) -> DelayProfile:

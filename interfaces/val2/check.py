@@ -20,7 +20,6 @@ from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
-from interfaces.val2.rows import nearest
 from interfaces.val2.signals import legal, settable
 from interfaces.val2.source import SourceFile, read_all
 from interfaces.val2.structure import Structure, StructureBlock, survey
@@ -37,6 +36,7 @@ from interfaces.val2.syntax import (
     parts,
 )
 from robots import puma560
+from vrs.checks import did_you_mean
 from vrs.engine import Engine
 
 _WORD: Final = re.compile(r'"[^"]*"|[#$]?[A-Za-z][A-Za-z0-9_.]*')
@@ -127,7 +127,7 @@ class _Names:
             return
         called = self.programs.get(i.program)
         if called is None:
-            close = nearest(i.program.upper(), [known.upper() for known in self.programs])
+            close = did_you_mean(i.program.upper(), [known.upper() for known in self.programs])
             yield ValError("Undefined program", f"{i.program}{close.lower()}", place=i.at)
         elif i.keyword in ("CALL", "GOSUB") and i.program not in self._unknown:
             parameters = called.parameters

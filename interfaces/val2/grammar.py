@@ -20,7 +20,7 @@ from interfaces.val2 import forms
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.functions import NEGATION, OPERATORS, row_of
 from interfaces.val2.instructions import STATEMENTS
-from interfaces.val2.rows import MISSING, TOO_MANY, Form, nearest
+from interfaces.val2.rows import MISSING, TOO_MANY, Form
 from interfaces.val2.signals import INPUTS, OUTPUTS, SignalRule
 from interfaces.val2.syntax import (
     BLANK,
@@ -36,6 +36,7 @@ from interfaces.val2.syntax import (
     children,
     literal,
 )
+from vrs.checks import did_you_mean
 
 SIGNIFICANT: Final = 15
 """Characters of a name that count, beside its prefix."""
@@ -197,7 +198,7 @@ def undefined(i: Instruction) -> ValError | None:
     """The error of a line whose word is no instruction; None where it's one."""
     if i.keyword in forms.IGNORED or i.keyword in STATEMENTS:
         return None
-    detail = f"{i.keyword}{nearest(i.keyword, forms.INSTRUCTIONS)}"
+    detail = f"{i.keyword}{did_you_mean(i.keyword, forms.INSTRUCTIONS)}"
     if i.keyword in ("ELSEIF", "ELIF"):
         detail = f"{i.keyword}; allowed: ELSE on a line, and an IF of its own on the next"
     return ValError("Undefined instruction", detail, place=i.at)
@@ -289,7 +290,7 @@ class _Trees:
             kind, known, names = "parameter", forms.PARAMETERS.keys(), [names[0].partition("=")[0].strip()]
         strange = [name for name in names if name not in known]
         for name in strange:
-            close = nearest(name, known)
+            close = did_you_mean(name, known)
             if close or len(names) > len(strange):
                 detail = f"{name}{close}; allowed: {', '.join(sorted(known))}"
                 raise ValError(f"Unknown {kind}", detail, place=_at(rest))
@@ -474,7 +475,7 @@ def _applied(token: Node, arguments: Sequence[Expression | Format | None]) -> Ap
     if function is None:
         if name in forms.OPERATORS:
             raise _misplaced(token)
-        detail = f"{token.upper()}{nearest(name, forms.FUNCTIONS)}; an array has brackets"
+        detail = f"{token.upper()}{did_you_mean(name, forms.FUNCTIONS)}; an array has brackets"
         raise ValError("Undefined function", detail, place=_at(token))
     given = () if arguments == [None] else tuple(arguments)
     function.expect(given, _at(token))

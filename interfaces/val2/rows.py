@@ -6,8 +6,7 @@ Parser, printer, compiler, checker, help and completion read rows alone; `forms.
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 
@@ -161,14 +160,3 @@ PARAMETERS: Final = {
     )
 }
 """What PARAMETER sets."""
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """`; did you mean MOVES?`, or nothing."""
-    close = nearest_word(word, words)
-    return f"; did you mean {close}?" if close else ""
-
-
-def nearest_word(word: str, words: Iterable[str]) -> str:
-    """The word that is most like another, upper case; empty where none is."""
-    return next(iter(difflib.get_close_matches(word.upper(), list(words), n=1, cutoff=0.7)), "")

@@ -19,10 +19,10 @@ from interfaces.val2.grammar import name_of, undefined
 from interfaces.val2.memory import MOST_DIMENSIONS
 from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
-from interfaces.val2.rows import nearest, nearest_word
 from interfaces.val2.signals import SignalRule
 from interfaces.val2.syntax import BLANK, Apply, Expression, Number, Program, Step, Text, Variable
 from interfaces.val2.values import Location, PrecisionPoint, Transformation, Value, from_oat, to_oat
+from vrs.checks import closest, did_you_mean
 
 DECIMALS: Final = 9
 """Of lengths [mm] and angles [deg] of transformations: what is read again is printed as it was."""
@@ -223,7 +223,9 @@ class _File:
         if word == ".END" and self.program is not None:
             self.end_program(trimmed=False)
         elif word and word not in DIRECTIVES:
-            detail = f"{line.split(maxsplit=1)[0]}{nearest(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
+            detail = (
+                f"{line.split(maxsplit=1)[0]}{did_you_mean(word, DIRECTIVES)}; allowed: {', '.join(DIRECTIVES)}"
+            )
             raise syntax_error(detail, number, indented(line) + 1, "Undefined directive")
         elif word:
             self.end_program()
@@ -412,7 +414,7 @@ def _stand_in(line: str, number: int, error: ValError) -> Step:
     keyword = (word or "").upper()
     if keyword and not assigns and keyword not in forms.INSTRUCTIONS:
         shaped = (kind for kind, shape in _SHAPES if shape.search(line))
-        keyword = nearest_word(keyword, forms.INSTRUCTIONS) or next(shaped, "")
+        keyword = closest(keyword, forms.INSTRUCTIONS) or next(shaped, "")
     jumps = keyword == "IF" and _JUMP.search(line)
     stands = "" if assigns or jumps else _STAND_INS.get(keyword, "")
     label = "" if label is None or error.what == "Invalid label" else label

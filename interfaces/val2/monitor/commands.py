@@ -5,7 +5,6 @@ Abbreviations, HELP, completion and the line of help below a prompt read these r
 
 from __future__ import annotations
 
-import difflib
 import enum
 import re
 import textwrap
@@ -20,6 +19,7 @@ from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
 from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
 from interfaces.val2.rows import Form, Setting
+from vrs.checks import did_you_mean
 
 Handler: TypeAlias = Callable[[TerminalState, str], Dialogue | None]
 """Carries a command out, with what follows its name; what asks, or None."""
@@ -128,7 +128,7 @@ def command(line: str) -> MonitorCommand:
     elif upper in forms.SWITCHES:
         said = f"{upper} is a switch: ENABLE {upper}, DISABLE {upper}"
     elif upper:
-        said = _short(upper) + (_near(upper, COMMANDS) or "; HELP lists the commands")
+        said = _short(upper) + (did_you_mean(upper, COMMANDS) or "; HELP lists the commands")
     else:
         said = _short(line)
     raise ValError("Invalid command", said)
@@ -149,11 +149,6 @@ def _candidates(word: str) -> list[str]:
 
 def _short(text: str) -> str:
     return text if len(text) <= 40 else f"{text[:37]}.."
-
-
-def _near(word: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(word.upper(), known, n=1, cutoff=0.7)
-    return f"; did you mean {close[0]}?" if close else ""
 
 
 def explained(word: str) -> Iterator[Word]:
@@ -198,7 +193,7 @@ def help_(state: TerminalState, rest: str) -> None:
     whole = next((some[0] for names in tables if len(some := begun(rest.upper(), names)) == 1), rest)
     found = list(explained(rest)) or list(explained(whole))
     if not found:
-        near = _near(rest, [word for names in tables for word in names])
+        near = did_you_mean(rest, [word for names in tables for word in names])
         raise ValError("Unknown word", _short(rest) + (near or "; HELP alone lists those that are allowed"))
     for one in found:
         kind = f"{one.kind}, {one.origin}" if one.origin else one.kind

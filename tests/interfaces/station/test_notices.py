@@ -43,6 +43,17 @@ def told(page: Page, words: str, at: str) -> None:
     assert page.get(live) in {"polite", "assertive"}
 
 
+def to_nominal(page: Page) -> None:
+    """Send both robots to the pose `nominal`, whence every key can move them."""
+    page.page.fill("#speed", "100")
+    page.page.click("[data-pose=nominal]")
+    page.wait(
+        """(() => { const { timeline, welcome } = station.session; const end = timeline.joints(timeline.end);
+        return welcome.poses.nominal.every((x, k) => Math.abs(x - end[k]) < 1e-6); })()"""
+    )
+    page.rest()
+
+
 def gone(page: Page) -> None:
     page.wait(f"document.getElementById('notice').hidden && {NOTICE} === ''")
 
@@ -121,10 +132,7 @@ def test_a_robot_that_waits_says_why_and_refuses_at_the_control(browser: Any, se
 
 def test_jogging_the_tool_into_a_singularity_says_so_and_what_leads_out(page: Page) -> None:
     page.take_control().rest()
-    page.page.fill("#speed", "100")
-    page.page.click("[data-pose=nominal]")
-    page.wait("station.session.timeline.end > station.session.now")
-    page.rest()
+    to_nominal(page)
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.down("PageUp")
     told(page, "near a singularity: jog joint 5", "button[aria-label='Tool along z, plus']")
@@ -143,16 +151,19 @@ def test_jogging_the_tool_into_a_singularity_says_so_and_what_leads_out(page: Pa
 
 def test_jogging_and_dragging_change_nothing_of_what_was_shown(page: Page) -> None:
     page.take_control().rest()
+    to_nominal(page)
+    page.page.fill("#speed", "30")
     page.page.evaluate(
         """window.said = []; new MutationObserver(() => said.push(badge.dataset.status))
         .observe(document.getElementById('badge'), { attributes: true, attributeFilter: ["data-status"] })"""
     )
-    before = page.virtual
     page.page.evaluate("document.activeElement.blur()")
-    for key in ("q", "a", "ArrowUp"):
-        page.page.keyboard.press(key, delay=700)
-    page.until(lambda: moved(page, 0.005, before))
-    page.rest()
+    for key in ("q", "ArrowUp", "a"):
+        before = page.virtual
+        page.page.keyboard.down(key)
+        page.until(lambda before=before: moved(page, 0.005, before))
+        page.page.keyboard.up(key)
+        page.rest()
     pane = page.page.locator("#pane").bounding_box()
     at = page.get("station.shared.drag.project(station.shared.drag.tool())")
     page.page.mouse.move(pane["x"] + at["x"], pane["y"] + at["y"])
