@@ -143,18 +143,6 @@ def one_of(name: str, value: str, words: Iterable[str], *more: str) -> str:
     return value
 
 
-def did_you_mean(given: object, words: Iterable[str]) -> str:
-    """`; did you mean wed?` of the word that's most like what was given; empty where none is."""
-    close = closest(given, words) if isinstance(given, str) else ""
-    return f"; did you mean {close}?" if close else ""
-
-
-def closest(given: str, words: Iterable[str]) -> str:
-    """The word that's most like what was given, whatever its case; empty where none is like it."""
-    folded = {word.casefold(): word for word in words}
-    return next((folded[one] for one in difflib.get_close_matches(given.casefold(), folded, n=1, cutoff=0.65)), "")
-
-
 def word(name: str, value: Any, kind: type[_WordT]) -> _WordT:
     """Return the member of an enumeration that a value is or names.
 
@@ -166,7 +154,24 @@ def word(name: str, value: Any, kind: type[_WordT]) -> _WordT:
     Raises:
         InvalidValueError: If it names none.
     """
-    return kind(one_of(name, value, kind))
+    if isinstance(value, kind):
+        return value
+    try:
+        return kind(value)
+    except ValueError:
+        raise InvalidValueError(name, value, f"one of {', '.join(kind)}", did_you_mean(value, kind)) from None
+
+
+def did_you_mean(given: object, words: Iterable[str]) -> str:
+    """`; did you mean wed?` of the word that's most like what was given; empty where none is."""
+    close = closest(given, words) if isinstance(given, str) else ""
+    return f"; did you mean {close}?" if close else ""
+
+
+def closest(given: str, words: Iterable[str]) -> str:
+    """The word that's most like what was given, whatever its case; empty where none is like it."""
+    folded = {word.casefold(): word for word in words}
+    return next((folded[one] for one in difflib.get_close_matches(given.casefold(), folded, n=1, cutoff=0.65)), "")
 
 
 def within(low: float, high: float, unit: str = "") -> msgspec.Meta:
