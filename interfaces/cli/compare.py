@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
-from interfaces.report.tables import FIGURES, shown
+from interfaces.report.tables import FIGURES, shown, table_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -123,11 +123,7 @@ def _alone(kind: str, summary: dict[str, Any]) -> Table:
 
 def _beside(kind: str, first: dict[str, Any], second: dict[str, Any]) -> Table:
     """Figures of two recordings, and by how much the second's are larger."""
-    from rich.table import Table
-
-    table = Table(title="Side by side", title_justify="left")
-    for name in ("", "first", "second", "difference", ""):
-        table.add_column(name, justify="right" if name else "left")
+    table = table_of("Side by side", ("", "first", "second", "difference", ""), left=("",))
     for path, name, scale, unit in ROWS[kind]:
         a, b = _at(first, path), _at(second, path)
         change = None if a is None or b is None else b - a

@@ -55,12 +55,12 @@ def show(file: ModelFile, as_json: AsJson = False) -> None:
         typer.echo(json.dumps(facts, indent=2))
         return
     from rich.console import Console
-    from rich.table import Table
+
+    from interfaces.report.tables import table_of
 
     title = f"{facts['name']}, model ID {facts['id']}, a map of {facts['map_bytes']} bytes"
-    table = Table(title=title, title_justify="left")
-    for column in ("bit", "element", "kind", "down [B]", "up [B]", "values"):
-        table.add_column(column, justify="left" if column in ("element", "kind", "values") else "right")
+    heads = ("bit", "element", "kind", "down [B]", "up [B]", "values")
+    table = table_of(title, heads, left=("element", "kind", "values"))
     for row in facts["elements"]:
         table.add_row(*(("" if cell is None else str(cell)).replace("[", r"\[") for cell in row.values()))
     Console().print(table)

@@ -139,26 +139,18 @@ class PlayHead:
         """
         self._live, self._span = live, span
         self._motion: _Running | _Chase | None = None
-        self._mode = Mode.LIVE
-        self._loop: tuple[float, float] | None = None
+        self.mode = Mode.LIVE
+        """What it does; only read."""
+        self.loop: tuple[float, float] | None = None
+        """Start and end of the loop [s]; None without one. Only read."""
         self.rate = 1.0
-        """Rate of play [timeline s / user s], negative to rewind."""
-
-    @property
-    def mode(self) -> Mode:
-        """What it does."""
-        return self._mode
-
-    @property
-    def loop(self) -> tuple[float, float] | None:
-        """Start and end of the loop [s]; None without one."""
-        return self._loop
+        """Rate of play [timeline s / user s], negative to rewind; only read."""
 
     def position(self, now: float) -> float | None:
         """The time to show [s] at the user's time now [s]; None while nothing is known of the live edge."""
         place, arrived = self._place(now)
         if arrived:
-            self._motion, self._mode = None, Mode.LIVE
+            self._motion, self.mode = None, Mode.LIVE
         return place
 
     def ahead(self, t_user: float) -> float | None:
@@ -185,7 +177,7 @@ class PlayHead:
 
     def _run(self, now: float, place: float, rate: float) -> _Running:
         """A run from a place, bound by the loop unless it has left that behind."""
-        loop = self._loop
+        loop = self.loop
         bound = loop is not None and (place <= loop[1] if rate > 0 else place >= loop[0])
         return _Running(now, place, rate, loop if bound and rate else None)
 
@@ -218,7 +210,7 @@ class PlayHead:
         """Stand dt [s] further on, or back where it's negative."""
         dt = finite("dt", dt, "finite seconds")
         self.pause(now=now)
-        if self._mode is Mode.PAUSED:
+        if self.mode is Mode.PAUSED:
             place = self.position(now)
             assert place is not None
             self.seek(place + dt, now=now)
@@ -236,26 +228,24 @@ class PlayHead:
         """
         allowed = f"a range of at least {SHORTEST} s in the timeline"
         start, end = finite("loop", start, allowed), finite("loop", end, allowed)
-        live, span = self._live(now), self._span()
+        live, span, given = self._live(now), self._span(), (start, end)
         if span is not None:
-            low, high = span[0], span[1] if live is None else max(span[1], live)
-            given, start, end = (start, end), max(start, low), min(end, high)
-        else:
-            given = start, end
+            high = span[1] if live is None else max(span[1], live)
+            start, end = max(start, span[0]), min(end, high)
         if end - start < SHORTEST - 1e-9:
             raise InvalidValueError("loop", given, allowed)
         place = self.position(now)
-        self._loop = start, end
+        self.loop = start, end
         if place is None:
             return
-        inside = self._mode in {Mode.PAUSED, Mode.PLAYING} and start <= place <= end
+        inside = self.mode in {Mode.PAUSED, Mode.PLAYING} and start <= place <= end
         self.seek(place if inside else end if self.rate < 0 else start, now=now)
 
     def clear_loop(self, *, now: float) -> None:
         """Loop no more; it goes on as it does."""
         place = self.position(now)
-        self._loop = None
-        if place is not None and self._mode is Mode.PLAYING:
+        self.loop = None
+        if place is not None and self.mode is Mode.PLAYING:
             self._motion = _Running(now, place, self.rate)
 
     def rewind(self, *, now: float, rate: float = 1.0) -> None:
@@ -268,12 +258,10 @@ class PlayHead:
         Raises:
             InvalidValueError: If rate is out of range.
         """
-        if self._mode is Mode.PLAYING:
-            self.play(now=now, rate=rate)
-        else:
-            mode, motion = self._mode, self._motion
-            self.play(now=now, rate=rate)
-            self._mode, self._motion = mode, motion
+        mode, motion = self.mode, self._motion
+        self.play(now=now, rate=rate)
+        if mode is not Mode.PLAYING:
+            self.mode, self._motion = mode, motion
 
     def seek(self, t: float, *, now: float) -> None:
         """Go to a time [s] at once, past or planned.
@@ -282,8 +270,8 @@ class PlayHead:
         """
         t = finite("t", t, "finite seconds")
         self.position(now)
-        standing = self._mode is Mode.PAUSED
-        self._mode = Mode.PAUSED if standing else Mode.PLAYING
+        standing = self.mode is Mode.PAUSED
+        self.mode = Mode.PAUSED if standing else Mode.PLAYING
         live = self._live(now)
         place = t if live is None else self._within(t, live)
         self._motion = self._run(now, place, 0.0 if standing else self.rate)
@@ -303,9 +291,9 @@ class PlayHead:
         place, live = self.position(now), self._live(now)
         if live == -math.inf:
             return now
-        self._loop = None
-        if place is None or live is None or self._mode is Mode.LIVE:
-            self._motion, self._mode = None, Mode.LIVE
+        self.loop = None
+        if place is None or live is None or self.mode is Mode.LIVE:
+            self._motion, self.mode = None, Mode.LIVE
             return now
         rate, since = self._pace(now), now + wait
         before = _Running(now, place, rate)
@@ -315,7 +303,7 @@ class PlayHead:
         steepest = 3.0 * abs(gap) / duration
         slope = min(max(1.0 - rate, -1.0), 1.0)
         slope = max(slope, -steepest) if gap > 0 else min(max(slope, 0.0), steepest)
-        self._motion, self._mode = _Chase(before, since, duration, gap, slope), Mode.CATCHING_UP
+        self._motion, self.mode = _Chase(before, since, duration, gap, slope), Mode.CATCHING_UP
         return since + duration
 
     def _pace(self, now: float) -> float:
@@ -328,9 +316,7 @@ class PlayHead:
 
     def _move(self, now: float, rate: float, mode: Mode) -> None:
         place = self.position(now)
-        self._mode = mode
         if place is None:
-            self._motion = None
-            self._mode = Mode.LIVE
+            self._motion, self.mode = None, Mode.LIVE
         else:
-            self._motion = self._run(now, place, rate)
+            self._motion, self.mode = self._run(now, place, rate), mode

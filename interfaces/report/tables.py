@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from vrs.ledger import Receipt
@@ -44,19 +44,23 @@ ROWS = (
 )
 
 
-def error_table(summary: Summary) -> Table:
-    """Joint and tool errors, a row a way of comparing."""
+def table_of(title: str, heads: Iterable[str], left: Collection[str]) -> Table:
+    """An empty table for a terminal; columns with the heads `left` are set left, the others right."""
     from rich.table import Table
 
-    table = Table(
-        title=f"Virtual and real {summary['robot']}, delay {summary['delay']}, offset {summary['offset']}",
-        title_justify="left",
-    )
+    table = Table(title=title, title_justify="left")
+    for head in heads:
+        table.add_column(head, justify="left" if head in left else "right")
+    return table
+
+
+def error_table(summary: Summary) -> Table:
+    """Joint and tool errors, a row a way of comparing."""
+    title = f"Virtual and real {summary['robot']}, delay {summary['delay']}, offset {summary['offset']}"
     mixed = "joint_rms_m" in summary["errors"]["timeline_time"]
-    for name in ("at equal", "joint", *(("rms", "max") if mixed else ("rms\ndeg", "max\ndeg"))):
-        table.add_column(name, justify="left" if name == "at equal" else "right")
-    for name in ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg"):
-        table.add_column(name, justify="right")
+    joints = ("rms", "max") if mixed else ("rms\ndeg", "max\ndeg")
+    tools = ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg")
+    table = table_of(title, ("at equal", "joint", *joints, *tools), left=("at equal",))
     for key, label in ROWS:
         row = summary["errors"][key]
         joint = row["worst_joint"]
@@ -82,12 +86,10 @@ def _of_joint(row: Summary, name: str, joint: int, *, mixed: bool) -> str:
 
 def attribution_table(summary: Summary) -> Table:
     """Errors split among their causes, a row a measure."""
-    from rich.table import Table
-
     order = summary["attribution_order"]
-    table = Table(title=f"Why: switched off in turn, {', '.join(map(_cause_words, order))}", title_justify="left")
-    for name in ("measure (rms)", "total", *map(_cause_words, order), "residual"):
-        table.add_column(name, justify="left" if name.startswith("measure") else "right")
+    causes = [cause.replace("_", " ") for cause in order]
+    heads = ("measure (rms)", "total", *causes, "residual")
+    table = table_of(f"Why: switched off in turn, {', '.join(causes)}", heads, left=("measure (rms)",))
     for item in summary["attribution"]:
         label, scale, unit = MEASURES[item["measure"]]
         values = [item["total"], *(item["parts"][cause] for cause in order), item["residual"]]
@@ -97,11 +99,7 @@ def attribution_table(summary: Summary) -> Table:
 
 def offset_table(summary: Summary) -> Table:
     """What other choices of the offset make of the same network."""
-    from rich.table import Table
-
-    table = Table(title="The same network, a body that follows exactly", title_justify="left")
-    for name in OFFSETS:
-        table.add_column(name, justify="left" if name == "offset" else "right")
+    table = table_of("The same network, a body that follows exactly", OFFSETS, left=("offset",))
     for row in offset_rows(summary):
         table.add_row(*(f"{value:.3f}" if isinstance(value, float) else str(value) for value in row))
     return table
@@ -162,10 +160,6 @@ def time_lines(summary: Summary) -> list[str]:
             f"the time difference is at least {_seconds(path['time_difference_bound'])}."
         )
     return lines
-
-
-def _cause_words(cause: str) -> str:
-    return cause.replace("_", " ")
 
 
 def _seconds(value: float | None) -> str:

@@ -229,19 +229,14 @@ class MemoryInbox:
 
     def receive(self, payloads: list[tuple[int, bytes]]) -> list[tuple[int, int, bytes]]:
         """Take the items of a packet; returns (element, ID, data) of the new ones in order."""
-        came = []
-        for index, payload in payloads:
-            number, _ = STORED.unpack_from(payload)
-            came.append((self._near(number), index, payload[STORED.size :]))
+        came = [(self._near(STORED.unpack_from(item)[0]), index, item[STORED.size :]) for index, item in payloads]
         new = []
         for number, index, data in sorted(came, key=lambda item: item[0]):
             # One that came before is acknowledged again: whoever sends it doesn't know.
-            if number <= self._newest:
-                self._owed[index] = number, -1
-                continue
-            self._newest = number
             self._owed[index] = number, -1
-            new.append((index, number, data))
+            if number > self._newest:
+                self._newest = number
+                new.append((index, number, data))
         return new
 
     def _near(self, number: int) -> int:
