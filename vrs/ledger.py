@@ -80,7 +80,7 @@ class Receipt(Record, frozen=True, omit_defaults=True, gc=False, eq=False):
     hindrance: Text = ""
     """Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it.
 
-    That's a singularity or a joint's limit.
+    That's a singularity or a joint's limit. Of an offset: that the limits don't let it be reached in time.
     """
 
     @property

@@ -1060,7 +1060,7 @@ _ROWS: Final = (
          "Corrections of the path begin: mode 1 cumulative, 2 world axes.", "VAL-II", _alteration(_alter),
          usage="ALTER (channel) mode", tags="beside", rule="channel"),
     Form("ALTOUT", "dx?=0, dy?=0, dz?=0, rx?=0, ry?=0, rz?=0",
-         "Correct the tool's place by a way [mm] and a turn [deg], exactly; 28 ms each.", "VAL-II",
+         "Correct the path, or the tool's place, by a way [mm] and a turn [deg]; 28 ms each.", "VAL-II",
          _alteration(_correct), tags="beside"),
     Form("NOALTER", "", "Corrections of the path end.", "VAL-II",
          _alteration(lambda c, _: c.arm.set_alter(None, now=c.now)), tags="beside"),

@@ -97,7 +97,7 @@ function checkReceipt(m) {
   m.undone = m.undone === undefined ? false : flag(m.undone, "Receipt.undone"); // Whether it was taken back or cancelled.
   m.shifted = m.shifted === undefined ? [] : list(m.shifted, 0, Infinity, "Receipt.shifted", (x) => whole(x, 1, WHOLE, "Receipt.shifted")); // Ids of commands whose moves now come at another time.
   m.superseded = m.superseded === undefined ? [] : list(m.superseded, 0, Infinity, "Receipt.superseded", (x) => whole(x, 1, WHOLE, "Receipt.superseded")); // Ids of commands that won't arrive any more, wholly or in part.
-  m.hindrance = m.hindrance === undefined ? "" : text(m.hindrance, 0, 2000, "Receipt.hindrance"); // Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it. That's a singularity or a joint's limit.
+  m.hindrance = m.hindrance === undefined ? "" : text(m.hindrance, 0, 2000, "Receipt.hindrance"); // Of a steering input that's accepted: what keeps the arm from going as asked, and what leads away from it. That's a singularity or a joint's limit. Of an offset: that the limits don't let it be reached in time.
   return m;
 }
 
