@@ -10,7 +10,7 @@ import pytest
 
 HOME = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((HOME / "examples").glob("[0-9]*.py"))
-PROGRAMS = sorted((HOME / "examples" / "val2").glob("*.v2"))
+PROGRAMS = [*sorted((HOME / "examples/val2").glob("*.v2")), *sorted((HOME / "examples/val2/textbook").glob("*.v2"))]
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)

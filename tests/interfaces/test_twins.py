@@ -10,6 +10,7 @@ from interfaces.link import LinkConditions
 from interfaces.messages.control import PROTOCOL, Attached, Postures
 from interfaces.messages.sites import DriveReport
 from interfaces.runtime.live.base_twins import BaseTwins
+from interfaces.teleop.architectures.compositions import ARCHITECTURES
 from robots import load
 from robots.mobile.robot import place
 from robots.onboard.driving import STAND, Drive, Posture
@@ -19,7 +20,10 @@ HERE, BESIDE = Posture(1.5, 3.0, 0.0), Posture(1.5, 3.2, 0.1)
 
 
 def attached(architecture: str) -> Attached:
-    return Attached(PROTOCOL, "ipr", frozen_array(HERE), "hold", 0.5, architecture=architecture)
+    estimates = architecture in ARCHITECTURES and ARCHITECTURES[architecture].estimates
+    return Attached(
+        PROTOCOL, "ipr", frozen_array(HERE), "hold", 0.5, architecture=architecture, estimates=estimates
+    )
 
 
 def driving() -> BaseTwins:

@@ -154,7 +154,7 @@ def test_a_paired_difference_has_a_verdict() -> None:
 
     def group(name: str, worst: list[float]) -> object:
         rows = [
-            replace(row, architecture=name, seed=k, metrics=replace(row.metrics, path_error_max=x))
+            replace(row, group=(name, *row.group[1:]), seed=k, metrics=replace(row.metrics, path_error_max=x))
             for k, x in enumerate(worst)
         ]
         return grouped(rows)[0]
@@ -175,7 +175,12 @@ def test_a_paired_difference_has_a_verdict() -> None:
 def test_a_summary_pairs_what_ran_under_the_same_network_and_has_the_worst_run() -> None:
     row = measure(DriveCase("timeline", Transport.STREAM, "none", "bare", "figure-eight", 0, 10.0))
     rows = [
-        replace(row, architecture=who, delay=delay, seed=k, metrics=replace(row.metrics, path_error_max=worst))
+        replace(
+            row,
+            group=(who, row.group[1], delay, *row.group[3:]),
+            seed=k,
+            metrics=replace(row.metrics, path_error_max=worst),
+        )
         for who, delay in (("II", "mon"), ("III", "mon"), ("III", "wed"))
         for k, worst in enumerate((0.02, 0.09, 0.04))
     ]

@@ -152,7 +152,12 @@ def test_a_robot_that_was_told_nothing_finds_itself_after_a_turn_on_the_spot(see
         assert abs(wrapped(theta - body.truth[2])) < math.radians(1)
         # On a map of another apartment it doesn't pretend.
         surveyor = Surveyor()
-        drive(body, 12.0, lambda _, __: Drive(0.0, 0.6), {"": surveyor})
+
+        def gather(_: float) -> None:
+            surveyor.move(body.time, body.reckoned)
+            surveyor.see(body.laser)
+
+        drive(body, 12.0, lambda _, __: Drive(0.0, 0.6), {}, gather)
         other = plan_map(apartment(seed + 100, ApartmentConfig(rooms=2)))
         assert len(locate(other, surveyor.surroundings())) != 1
 

@@ -68,6 +68,8 @@ def test_a_walk_by_keys_comes_by_everything(page: Page) -> None:
 
 def test_stop_can_be_pressed_however_narrow_the_page_is(page: Page) -> None:
     page.open()
+    # Those of the page before may have control for a moment yet.
+    page.wait("!document.getElementById('stop').hidden")
     for width in (390, 640, 820, 1001):
         page.page.set_viewport_size({"width": width, "height": 720})
         box = page.page.locator("#stop").bounding_box()
