@@ -176,7 +176,8 @@ class Units:
         if known is None or known.path is None or known.place >= len(known.text):
             self._status[unit] = ENDED if known is not None and known.path is not None else NOT_OPEN
             return None
-        line, _, _ = known.text[known.place :].partition("\n")
+        end = known.text.find("\n", known.place)
+        line = known.text[known.place : len(known.text) if end < 0 else end]
         known.place += len(line) + 1
         self._status[unit] = DONE
         return line
@@ -200,14 +201,14 @@ class Units:
         known = self._units.get(unit)
         if known is None or known.path is None or not known.writes:
             self._status[unit] = NOT_OPEN
-        elif known.sent is not None and len(known.sent) + len(text) <= LARGEST:
-            known.sent += text
-            self._status[unit] = self._write(known.path, known.sent)
-        elif len(known.text) + len(text) > LARGEST:
+        elif len(known.text if known.sent is None else known.sent) + len(text) > LARGEST:
             self._status[unit] = NOT_READY
-        else:
+        elif known.sent is None:
             known.text += text
             self._status[unit] = DONE
+        else:
+            known.sent += text
+            self._status[unit] = self._write(known.path, known.sent)
 
     def status(self, unit: float) -> float:
         """IOSTAT: 1 where the last that was wanted of a unit is done, else why it isn't."""

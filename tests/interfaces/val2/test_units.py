@@ -8,7 +8,7 @@ import pytest
 
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
-from interfaces.val2.units import Units
+from interfaces.val2.units import ENDED, LARGEST, NOT_READY, Units
 from robots import puma560
 from tests.interfaces.val2.test_check import exit_code
 from tests.interfaces.val2.test_tasks import programs
@@ -110,3 +110,15 @@ def test_the_terminal_is_unit_4() -> None:
     text = programs(main="READ (4) n, $name; WRITE (4) $name, n")
     assert rehearse(parse_file(text, "t.v2"), puma560.model(), listeners=listeners).findings == ()
     assert said == ["Ada 5\n"]
+
+
+def test_what_is_too_long_for_a_serial_line_is_refused_and_not_read_back(tmp_path: Path) -> None:
+    (tmp_path / "serial1.in").write_text("only this\n")
+    units = Units(tmp_path)
+    unit = units.attach(None, "SERIAL:1")
+    units.write(unit, "x" * LARGEST)
+    units.write(unit, "y")
+    assert units.status(unit) == NOT_READY
+    assert (units.read(unit), units.read(unit)) == ("only this", None)
+    assert units.status(unit) == ENDED
+    assert (tmp_path / "serial1.out").stat().st_size == LARGEST
