@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import math
 import sys
@@ -156,10 +155,7 @@ def word(name: str, value: Any, kind: type[_WordT]) -> _WordT:
     """
     if isinstance(value, kind):
         return value
-    try:
-        return kind(value)
-    except ValueError:
-        raise InvalidValueError(name, value, f"one of {', '.join(kind)}", did_you_mean(value, kind)) from None
+    return kind(one_of(name, value, kind))
 
 
 def did_you_mean(given: object, words: Iterable[str]) -> str:
@@ -170,6 +166,9 @@ def did_you_mean(given: object, words: Iterable[str]) -> str:
 
 def closest(given: str, words: Iterable[str]) -> str:
     """The word that's most like what was given, whatever its case; empty where none is like it."""
+    # Only errors need it: at the top it would take a millisecond of the engine's import.
+    import difflib
+
     folded = {word.casefold(): word for word in words}
     return next((folded[one] for one in difflib.get_close_matches(given.casefold(), folded, n=1, cutoff=0.65)), "")
 

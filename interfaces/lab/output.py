@@ -168,11 +168,17 @@ def write_runs(found: Reproduction, out: Path, tables: Sequence[Table]) -> None:
     Raises:
         FormatError: If the directory, which must exist, can't hold them.
     """
+    runs = csv_of(tables[0].columns, (map(cell, row) for table in tables for row in table.rows))
+    write_files(out, found.findings.figures, {"runs.csv": runs, "summary.json": to_json(found)})
+
+
+def csv_of(columns: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table as CSV, its columns' names first."""
     lines = io.StringIO()
-    rows = csv.writer(lines, lineterminator="\n")
-    rows.writerow(tables[0].columns)
-    rows.writerows(map(cell, row) for table in tables for row in table.rows)
-    write_files(out, found.findings.figures, {"runs.csv": lines.getvalue(), "summary.json": to_json(found)})
+    table = csv.writer(lines, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(rows)
+    return lines.getvalue()
 
 
 def rich_tables(reproduction: Reproduction) -> list[RichTable]:

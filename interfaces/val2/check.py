@@ -133,8 +133,7 @@ class _Names:
             return
         called = self.programs.get(i.program)
         if called is None:
-            close = did_you_mean(i.program.upper(), [known.upper() for known in self.programs])
-            yield ValError("Undefined program", f"{i.program}{close.lower()}", place=i.at)
+            yield ValError("Undefined program", f"{i.program}{did_you_mean(i.program, self.programs)}", place=i.at)
         elif STATEMENTS[i.keyword].rule in ("call", "tasks") and i.program not in self._unknown:
             parameters, arguments = called.parameters, arguments_of(i)
             if len(arguments) > len(parameters):

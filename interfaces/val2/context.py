@@ -323,9 +323,7 @@ class Context(ABC):
         Raises:
             ValError: If there's no such timer.
         """
-        if number not in TIMERS:
-            raise ValError("Illegal timer number", f"{number:.9g}: 0 to {TIMERS[-1]}")
-        return int(number)
+        return _one_of("timer", number, TIMERS)
 
     def channel(self, number: float) -> int:
         """The number of a channel.
@@ -333,9 +331,7 @@ class Context(ABC):
         Raises:
             ValError: If there's no such channel.
         """
-        if number not in CHANNELS:
-            raise ValError("Illegal channel number", f"{number:.9g}: {CHANNELS[0]} to {CHANNELS[-1]}")
-        return int(number)
+        return _one_of("channel", number, CHANNELS)
 
     def switch(self, name: str, on: bool) -> None:
         """ENABLE or DISABLE.
@@ -433,9 +429,7 @@ class Context(ABC):
         Raises:
             ValError: If there's no such task.
         """
-        if number not in TASKS:
-            raise ValError("Illegal task number", f"{number:.9g}: 0 to {TASKS[-1]}")
-        return int(number)
+        return _one_of("task", number, TASKS)
 
     def task_state(self, number: int) -> float:
         """TASK: 0 where nothing has run, 1 at an end, 2 after an error, 3 while it stands, 4 while it runs."""
@@ -479,3 +473,14 @@ class Context(ABC):
         """
         if not self.switches["POWER"]:
             raise ValError("Arm power off")
+
+
+def _one_of(what: str, number: float, numbers: range) -> int:
+    """A number as the index that it is.
+
+    Raises:
+        ValError: If it's none.
+    """
+    if number not in numbers:
+        raise ValError(f"Illegal {what} number", f"{number:.9g}: {numbers[0]} to {numbers[-1]}")
+    return int(number)

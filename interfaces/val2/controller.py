@@ -90,7 +90,7 @@ class Controller(Context):
         self.timers = [now] * len(self.timers)
         self.cell: tuple[SignalRule, ...] = ()
         """What sets the inputs; begins anew at every EXECUTE."""
-        self.tasks = self._tasks = dict[int, Task]()
+        self.tasks: dict[int, Task] = {}
         self._do: Task | None = None
         self._busy = now
         self._due = False
@@ -98,7 +98,7 @@ class Controller(Context):
     @property
     def running(self) -> bool:
         """Whether the main program runs."""
-        return 0 in self._tasks and self._tasks[0].state is ProgramState.RUNNING
+        return 0 in self.tasks and self.tasks[0].state is ProgramState.RUNNING
 
     @property
     def doing(self) -> bool:
@@ -108,11 +108,11 @@ class Controller(Context):
     @property
     def busy(self) -> bool:
         """Whether any program runs."""
-        return any(task.state is ProgramState.RUNNING for task in self._tasks.values())
+        return any(task.state is ProgramState.RUNNING for task in self.tasks.values())
 
     def status(self, number: int = 0) -> ControllerStatus:
         """What a task does, the main program unless another is asked for."""
-        task = self._tasks.get(number)
+        task = self.tasks.get(number)
         if task is None:
             return ControllerStatus(ProgramState.IDLE)
         stack = tuple((f.name, f.step) for f in task.frames)
@@ -120,7 +120,7 @@ class Controller(Context):
 
     def stacks(self) -> list[tuple[tuple[str, int], ...]]:
         """Programs and steps of each task that runs, outermost first."""
-        return [self.status(n).stack for n, task in self._tasks.items() if task.state is ProgramState.RUNNING]
+        return [self.status(n).stack for n, task in self.tasks.items() if task.state is ProgramState.RUNNING]
 
     # Commands.
 
@@ -170,7 +170,7 @@ class Controller(Context):
             self.warned.clear()
             self.stop_first, self.path = False, (None, None)
             self.signals.begin(self.cell, values, now=self.now)
-        self._tasks[number], self._due = task, True
+        self.tasks[number], self._due = task, True
         return task
 
     def _condition(self, rule: SignalRule) -> Callable[[], bool]:
@@ -234,7 +234,7 @@ class Controller(Context):
             self._do.end("ABORT")
             self._do = None
         elif self.running:
-            self._tasks[0].pause("ABORT")
+            self.tasks[0].pause("ABORT")
         if not number:
             self.arm.brake(now=self.now)
 
@@ -330,7 +330,7 @@ class Controller(Context):
         """
         if self.busy or self._do is not None:
             raise ValError("Program already running")
-        self._tasks.clear()
+        self.tasks.clear()
         self.memory.clear()
         self.compiled.clear()
         self.signals.reset()
@@ -342,7 +342,7 @@ class Controller(Context):
         Raises:
             ValError: If something does.
         """
-        task = self._tasks.get(number)
+        task = self.tasks.get(number)
         if (task is not None and task.state is ProgramState.RUNNING) or (number == 0 and self._do is not None):
             raise ValError("Program already running", f"task {number}" if number else "")
 
@@ -356,7 +356,7 @@ class Controller(Context):
 
     def _active(self) -> list[Task]:
         """What runs."""
-        running = [task for _, task in sorted(self._tasks.items()) if task.state is ProgramState.RUNNING]
+        running = [task for _, task in sorted(self.tasks.items()) if task.state is ProgramState.RUNNING]
         return running if self._do is None else [self._do, *running]
 
     def advance(self, *, now: float) -> tuple[Event, ...]:

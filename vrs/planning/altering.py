@@ -70,6 +70,11 @@ class Course(NamedTuple):
         found[(t < self.knots[0]) | (t > self.knots[-1]), 1:] = 0.0
         return found
 
+    def then(self, later: Course) -> Course:
+        """It, and one that begins where it ends."""
+        knots = np.concatenate([self.knots, later.knots[1:]])
+        return Course(knots, np.concatenate([self.coefficients, later.coefficients]))
+
 
 STILL = Course(np.zeros(2), np.zeros((1, 6, 6)))
 """No offset."""
@@ -248,14 +253,7 @@ def alter(
     model = tooled(task.model, task.tool)
     for head, ends, late in _ways(float(window.starts[0]), offset, given, stays, over):
         for end in ends or (None,):
-            course = (
-                head
-                if end is None
-                else Course(
-                    np.concatenate([head.knots, end.knots[1:]]),
-                    np.concatenate([head.coefficients, end.coefficients]),
-                )
-            )
+            course = head if end is None else head.then(end)
             try:
                 plan, segments = _altered(window, start, course, task.frame, model)
             except PlanningError as error:

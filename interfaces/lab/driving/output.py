@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Sequence
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from interfaces.lab.claims import Figure
 from interfaces.lab.driving.sweep import CAUSES, Group, grouped, paired
-from interfaces.lab.output import BAD, REAL, VIRTUAL, draw, legend, write_files
+from interfaces.lab.output import BAD, REAL, VIRTUAL, csv_of, draw, legend, write_files
 from interfaces.lab.statistics import LEVEL, RANGE, Estimate
 from interfaces.runs.drive_run import COLUMNS, KEYS, METRICS, DriveCase, DriveRun, Row, cell, values_of
 from interfaces.runs.summary import Attribution
@@ -198,12 +196,8 @@ def write(rows: Sequence[Row], found: dict[str, Any], figures: Sequence[Figure],
     Raises:
         FormatError: If it can't hold them.
     """
-    lines = io.StringIO()
-    table = csv.writer(lines, lineterminator="\n")
-    table.writerow(COLUMNS)
-    table.writerows(_row(row) for row in rows)
     text = json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False)
-    write_files(out, figures, {"runs.csv": lines.getvalue(), "summary.json": text + "\n"})
+    write_files(out, figures, {"runs.csv": csv_of(COLUMNS, map(_row, rows)), "summary.json": text + "\n"})
 
 
 SHOWN = ("path_error_max", "time_difference_mean", "speed_error")

@@ -322,6 +322,10 @@ class Arm(SettingsInForce):
         """Whether the arm is on a motion on which corrections that add up wouldn't stay by themselves."""
         return self._alterations.cumulative and self._altered_at + DELAY < self._arrival()
 
+    def _over(self, now: float) -> bool:
+        """Whether NOALTER has ended corrections on the way: the arm has arrived."""
+        return self._alterations.ends and now >= self._arrival()
+
     def _arrival(self) -> float:
         """When the newest motion ends, whatever corrections on the way last [s]; in the past where there's none."""
         receipt = self._newest()
@@ -478,7 +482,7 @@ class Arm(SettingsInForce):
             ValError: If the path isn't altered, or the values aren't six finite numbers.
         """
         self._update(now)
-        if self._alterations.ends and now >= self._arrival():
+        if self._over(now):
             raise ValError("Path isn't altered", "NOALTER has ended it")
         offset = self._alterations.added(values)
         if self._dry is not None:
@@ -489,8 +493,7 @@ class Arm(SettingsInForce):
         """Whether the path is altered by corrections that come on a channel."""
         self.renew(now=now)
         alterations = self._alterations
-        over = alterations.ends and self._now >= self._arrival()
-        return alterations.mode is not None and not over and alterations.channel == channel
+        return alterations.mode is not None and not self._over(self._now) and alterations.channel == channel
 
     def _move(
         self,

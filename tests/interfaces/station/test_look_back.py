@@ -12,21 +12,11 @@ import numpy as np
 from interfaces.recording.recording import open_recording
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import PATIENCE, Page, paged, station, until
+from tests.interfaces.station.test_driving import SERVE as DRIVEN
 from tests.interfaces.station.test_driving import gone, postures, rest
 
-SERVE = (
-    "serve",
-    "--robot",
-    "ipr",
-    "--link-loss",
-    "hold",
-    "--delay",
-    "constant:0.05",
-    "--port",
-    "0",
-    "--camera",
-    "0",
-)
+SERVE = (*DRIVEN[:-1], "0")
+"""As there, without pictures."""
 PLACE = """twin => { const node = replay.node(0, 'vrs', twin, 'body', '0');
     node.updateMatrix();
     return node.matrix.toArray(); }"""
