@@ -1,6 +1,8 @@
 """Control messages: who is there, who may command, what time it is, and how the way to the robot is.
 
 Frozen values, like those of `interfaces.messages`. Times are session times: the operator's, in seconds.
+
+One concept in over 600 lines: all that a hub and its clients say to each other besides commands and timelines.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Messages of a recording, as they stand in the file: of arms, of mobile robots, of commands and links.
 
-All that a file may hold is here: a reader finds each message and what it is made of in one place.
+One concept: all that a file may hold is here, so that a reader finds each message and what it is made of in one
+place.
 """
 
 from __future__ import annotations

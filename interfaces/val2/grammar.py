@@ -2,6 +2,8 @@
 
 Lark calls `_Trees` for each rule that it has recognised, inner ones first. Which keyword takes which operands, and
 which of them may be missing, is told by its row in `forms.py`.
+
+One concept in over 600 lines: what each rule of the grammar comes to.
 """
 
 from __future__ import annotations
