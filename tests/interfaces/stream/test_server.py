@@ -198,6 +198,27 @@ def test_a_thousand_that_come_and_go_leave_no_handle_and_no_task():
         assert after[1] <= before[1] + 2
 
 
+def test_a_machine_that_stood_still_is_charged_to_no_client(monkeypatch):
+    receive = HubSession.receive
+
+    def slow(self, data, *, now):
+        time.sleep(0.3)
+        receive(self, data, now=now)
+
+    async def talk(serving):
+        connection = await greeted(serving)
+        monkeypatch.undo()
+        begun = time.monotonic()
+        await connection.send(encode(Ping(1, 0.0), Encoding.MSGPACK))
+        await wait(connection, "pong")
+        await connection.close()
+        return time.monotonic() - begun
+
+    with served() as serving:
+        monkeypatch.setattr(HubSession, "receive", slow)
+        assert asyncio.run(talk(serving)) < 4.0
+
+
 def test_a_fault_of_ours_ends_one_connection_only(monkeypatch, caplog):
     from vrs.errors import VrsError
 
