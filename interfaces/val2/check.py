@@ -21,7 +21,7 @@ from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
-from interfaces.val2.signals import legal, settable
+from interfaces.val2.signals import HIGHEST, legal, settable
 from interfaces.val2.source import SourceFile, read_all, says_dialect
 from interfaces.val2.structure import Structure, StructureBlock, survey
 from interfaces.val2.syntax import (
@@ -369,6 +369,7 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "mode": _range(0, 3, "a mode, 0 to 3"),
     "task": _range(TASKS[0], TASKS[-1], f"a task, {TASKS[0]} to {TASKS[-1]}"),
     "channel": _range(CHANNELS[0], CHANNELS[-1], f"a channel, {CHANNELS[0]} to {CHANNELS[-1]}"),
+    "priority": _range(1, HIGHEST, f"a priority, 1 to {HIGHEST:g}"),
     "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
 }
 """What numbers that are written down have to be."""

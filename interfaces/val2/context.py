@@ -201,6 +201,8 @@ class RunningTask(Protocol):
     """Why it paused or ended."""
     cycles: int
     reactions: Reactions
+    error: ValError | None
+    """The last one: what REACTE's program reacts to."""
 
     @property
     def program(self) -> str:

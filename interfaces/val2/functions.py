@@ -222,6 +222,13 @@ def _status(c: Context, program: str) -> float:
     return max((c.task_state(n) for n, task in c.tasks.items() if task.program == name), default=0.0)
 
 
+def _error(c: Context, code: float | None) -> str:
+    if code is not None:
+        return MESSAGES.get(whole(code), f"*Error {code:.9g}*")
+    last = c.task.error if c.task is not None else None
+    return "" if last is None else str(ValError(last.what, last.detail))
+
+
 _FUNCTIONS: Final = (
     # Of numbers.
     Form("ABS", "x -> real", "Absolute value.", "VAL-II", abs),
@@ -328,8 +335,9 @@ _FUNCTIONS: Final = (
          lambda c, unit, _: c.units.status(unit), tags="context"),
     Form("GETC", "unit, mode?=0 -> real", "Code of the next character of a file, or why there's none.", "V+",
          lambda c, unit, _: c.units.character(whole(unit)), tags="context"),
-    Form("$ERROR", "code -> string", "Text of an error that IOSTAT gives.", "V+",
-         lambda code: MESSAGES.get(whole(code), f"*Error {code:.9g}*")),
+    Form("$ERROR", "code? -> string",
+         "Text of an error that IOSTAT gives; without a code, of the task's last error.", "V+", _error,
+         tags="context"),
     Form("LNGB", "text:string, from?=1 -> real", "An integer of four characters, the highest first.", "V+",
          lambda text, first: _of_bytes(">i", text, first)),
     Form("FLTB", "text:string, from?=1 -> real", "A number of four characters.", "V+",
