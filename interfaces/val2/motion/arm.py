@@ -491,9 +491,12 @@ class Arm(SettingsInForce):
 
     def altering(self, channel: int, *, now: float) -> bool:
         """Whether the path is altered by corrections that come on a channel."""
+        return self.altered_since(now=now) is not None and self._alterations.channel == channel
+
+    def altered_since(self, *, now: float) -> float | None:
+        """Since when the path is altered [s]; None while it isn't."""
         self.renew(now=now)
-        alterations = self._alterations
-        return alterations.mode is not None and not self._over(self._now) and alterations.channel == channel
+        return None if self._alterations.mode is None or self._over(self._now) else self._alterations.since
 
     def _move(
         self,
@@ -709,7 +712,7 @@ class Arm(SettingsInForce):
             return
         if alterations.on_way is not None:
             self._keep(now)
-        alterations.set(mode, channel)
+        alterations.set(mode, channel, self._now)
 
     def begin_program(self) -> None:
         """EXECUTE: speeds, tolerances and requests are as at the beginning."""
