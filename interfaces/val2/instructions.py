@@ -40,7 +40,7 @@ from interfaces.val2.functions import OPERATORS, whole
 from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.motion.speeds import require
-from interfaces.val2.rows import Form, OperandSlot, Origin
+from interfaces.val2.rows import Form, OperandSlot, Origin, numbered
 from interfaces.val2.signals import USUAL, Reaction, Reactions, legal
 from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
@@ -170,8 +170,7 @@ def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: floa
 
 
 def _check_drive(c: Context, _: Instruction, joint: float, _angle: float, percent: float) -> None:
-    if joint not in range(1, 7):
-        raise ValError("Illegal joint number", f"{joint:.9g}: 1 to 6")
+    numbered("joint", joint)
     c.capped("DRIVE at", percent)
 
 
@@ -229,7 +228,7 @@ def _check_hand(_: Context, i: Instruction, opening: float | None) -> None:
 
 
 def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> None:
-    c.timers[c.timer(number)] = c.now - seconds
+    c.timers[numbered("timer", number)] = c.now - seconds
 
 
 def _switch(c: Context, i: Instruction) -> None:
@@ -253,7 +252,7 @@ def _correct(c: Context, _: Instruction, *values: float) -> None:
 
 def _channel(c: Context, i: Instruction, number: float, value: float) -> None:
     """DAC, IOPUT."""
-    c.channels[i.keyword][c.channel(number)] = value
+    c.channels[i.keyword][numbered("channel", number)] = value
 
 
 def _path(c: Context, i: Instruction) -> None:
@@ -764,7 +763,9 @@ def _execute(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     def execute(s: Slots) -> int:
         task, cycles, step = (number(s) for number in numbers)
         code, arguments = called(s)
-        begun = c.begin(c.task_number(task), code, arguments, cycles=whole(cycles), step=whole(step), single=False)
+        begun = c.begin(
+            numbered("task", task), code, arguments, cycles=whole(cycles), step=whole(step), single=False
+        )
         if i.keyword == "PRIME":
             begun.pause("PRIME")
         return n + 1
@@ -993,7 +994,7 @@ def _movement(
 
 def _of_tasks(name: str, pc: str, explanation: str, do: Callable[[Context, int], None]) -> Iterator[Form]:
     """The rows of V+ and of VAL-II's process control of what is done to another task."""
-    act = _now(lambda c, _, number: do(c, c.task_number(number)))
+    act = _now(lambda c, _, number: do(c, numbered("task", number)))
     yield Form(name, "task:task?=0", explanation, "V+", act, tags="beside")
     if pc:
         said = explanation.replace("a task", "a process control program", 1)
@@ -1212,11 +1213,11 @@ _ROWS: Final = (
          usage="PRIME [task] program(argument, ..)[, cycles[, step]]", rule="tasks", tags="beside"),
     *_of_tasks("ABORT", "PCABORT", "Stop a task at once; it can go on.", Context.abort_task),
     *_of_tasks("PROCEED", "PCPROCEED", "Let a task that stands go on, with its next step.",
-               partial(Context.resume_task, again=False)),
+               Context.proceed),
     *_of_tasks("RETRY", "PCRETRY", "Let a task that stands go on, with the step that it was at.",
-               partial(Context.resume_task, again=True)),
-    *_of_tasks("KILL", "", "Let a task that stands be at its end.", Context.kill_task),
-    *_of_tasks("CYCLE.END", "PCEND", "Let the present cycle of a task be its last.", Context.finish_task),
+               partial(Context.proceed, again=True)),
+    *_of_tasks("KILL", "", "Let a task that stands be at its end.", Context.kill),
+    *_of_tasks("CYCLE.END", "PCEND", "Let the present cycle of a task be its last.", Context.finish),
     # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
          rule="items"),

@@ -145,6 +145,16 @@ class Setting:
     high: float = 1.0
     unit: str = ""
 
+    def require(self, value: float, what: str = "Illegal value", at: TextPosition | None = None) -> None:
+        """See that a parameter may have a value.
+
+        Raises:
+            ValError: If it may not.
+        """
+        if not self.low <= value <= self.high:
+            detail = f"{value:.9g}; allowed: {self.name} of {self.low:g} to {self.high:g} {self.unit}"
+            raise ValError(what, detail.rstrip(), place=at)
+
 
 SWITCHES: Final = {
     row.name: row
@@ -169,3 +179,21 @@ PARAMETERS: Final = {
     )
 }
 """What PARAMETER sets."""
+TIMERS: Final = range(16)
+CHANNELS: Final = range(1, 33)
+"""Of analogue inputs and outputs, and of ports, each."""
+TASKS: Final = range(28)
+"""Programs that may run beside each other. Task 0 is the main one, which has the arm as it begins."""
+NUMBERS: Final = {"timer": TIMERS, "channel": CHANNELS, "task": TASKS, "joint": range(1, 7)}
+
+
+def numbered(what: str, number: float) -> int:
+    """The number of a timer, a channel, a task or a joint.
+
+    Raises:
+        ValError: If there's no such one.
+    """
+    numbers = NUMBERS[what]
+    if number not in numbers:
+        raise ValError(f"Illegal {what} number", f"{number:.9g}: {numbers[0]} to {numbers[-1]}")
+    return int(number)

@@ -33,6 +33,7 @@ from interfaces.val2.motion.places import (
 )
 from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
+from interfaces.val2.rows import numbered
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Alter, Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
@@ -391,8 +392,7 @@ class Arm(SettingsInForce):
 
     def drive(self, joint: int, change: float, speed: float, *, now: float) -> None:
         """DRIVE: turn a joint, 1 to 6, by a change [deg] at a speed [%]."""
-        if joint not in range(1, 7):
-            raise ValError("Illegal joint number", f"{joint}: 1 to 6")
+        numbered("joint", joint)
         require(0 < speed < math.inf, speed, "a speed is above 0 %")
         joints = list(self.destination(now=now).joints.joints)
         joints[joint - 1] += change

@@ -238,7 +238,7 @@ def test_an_error_calls_what_reacte_names_and_the_program_goes_on_with_the_next_
 def test_a_place_out_of_reach_is_an_error_that_reacte_knows() -> None:
     rig = Rig()
     rig.run(body("REACTE trap", "PARAMETER VPLUS = 2", "MOVE TRANS(1)", "BREAK", "TYPE DX(HERE)") + TRAP)
-    assert rig.typed().splitlines() == ["*Illegal value* VPLUS 2: 0 to 1", " 1"]
+    assert rig.typed().splitlines() == ["*Illegal value* 2; allowed: VPLUS of 0 to 1", " 1"]
 
 
 def test_reactions_wait_for_what_reacte_calls() -> None:
