@@ -21,10 +21,10 @@ function rests({ type, rates, twist, v, w }) {
 }
 
 export class Notices {
-  constructor(session, root) {
+  constructor(session) {
     this.session = session;
     this.element = h("p.notice", { id: "notice", hidden: true });
-    root.append(h("div", { role: "status", "aria-live": "assertive" }, this.element));
+    this.box = h("div", { role: "status", "aria-live": "assertive" }, this.element);
     /** The control that was used last, and where it was. */
     this.control = this.place = null;
     /** The one that is spoken of, and until when. */
