@@ -190,13 +190,6 @@ def tables(summary: dict[str, Any], *, err: bool = False) -> None:
     """Show a summary's tables, on standard error if asked for."""
     from rich.console import Console
 
-    from interfaces.report.tables import attribution_table, error_table, offset_table, time_lines
+    from interfaces.report.tables import rich_tables
 
-    console = Console(stderr=err)
-    console.print(error_table(summary))
-    if summary["attribution"]:
-        console.print(attribution_table(summary))
-    if summary["offsets"]:
-        console.print(offset_table(summary))
-    for line in time_lines(summary):
-        console.print(line, highlight=False)
+    Console(stderr=err, markup=False).print(*rich_tables(summary), sep="\n")

@@ -62,8 +62,8 @@ def show(file: ModelFile, as_json: AsJson = False) -> None:
     heads = ("bit", "element", "kind", "down [B]", "up [B]", "values")
     table = table_of(title, heads, left=("element", "kind", "values"))
     for row in facts["elements"]:
-        table.add_row(*(("" if cell is None else str(cell)).replace("[", r"\[") for cell in row.values()))
-    Console().print(table)
+        table.add_row(*("" if cell is None else str(cell) for cell in row.values()))
+    Console(markup=False).print(table)
 
 
 @model.command(short_help="What is wrong with a model")
