@@ -14,11 +14,9 @@ from interfaces.cli.demo import (
     DEFAULT_SEED,
     RECORDING,
     RESULTS,
-    complain,
-    explained,
+    conclude,
     prepare,
     show,
-    write,
 )
 from interfaces.cli.options import (
     Delay,
@@ -66,7 +64,6 @@ def run(
     """
     from interfaces.link import Conditions, delay_profile
     from interfaces.recording.run_recorders import RunRecorder
-    from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
     from interfaces.val2.corrections import read_corrections
     from interfaces.val2.playing import Listeners
@@ -84,11 +81,7 @@ def run(
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
         files=directory, corrections=corrected, keeper=recorder,
     )  # fmt: skip
-    whole, attributions, offsets = explained(played.plan, played.run, robot, profile, seed, D, order)
-    recorder.finish(attributions, offsets)
-    summary = summarize(whole, attributions, offsets)
-    write(summary, whole, out)
-    complain(recorder)
+    summary = conclude(played.plan, played.run, recorder, out, robot, profile, D=D, seed=seed, service=order)
     show(summary, out, recorded=not recorder.problem, err=True)
     if played.error is not None:
         raise played.error
