@@ -118,6 +118,8 @@ def number_in(name: str, value: object, low: float, high: float, what: str = "a 
     Raises:
         InvalidValueError: If it is anything else.
     """
+    if type(value) is float and low <= value <= high and math.isfinite(value):
+        return value
     allowed = f"{what} in [{low:g}, {high:g}]{unit}"
     number = finite(name, value, allowed)
     if not low <= number <= high:

@@ -186,7 +186,9 @@ class Channel(Generic[T]):
             delivery, record = self._ready.popleft()
             self.log.settle(record)
             taken.append(delivery)
-        return tuple(sorted(taken, key=lambda delivery: delivery.arrived))
+        if len(taken) > 1:
+            taken.sort(key=lambda delivery: delivery.arrived)
+        return tuple(taken)
 
     def next_deadline(self) -> float | None:
         """When something arrives or is sent again [s]; a receipt then may still be empty. None when idle."""

@@ -13,7 +13,6 @@ from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
 from interfaces.messages import Refusal
-from interfaces.messages.fields import Epoch
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.requests import check_crosses
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
@@ -298,7 +297,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         # A robot that knows that it has halted isn't told.
         halted = "" if report is None or report.halted else text_of(site.halted)
         facts = self.log.count, now, self._began, heard, entries, wanted, halted
-        return Orders(Epoch(site.epoch), number, now, *facts)
+        return Orders(site.epoch, number, now, *facts)
 
     @override
     def next_deadline(self) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
-from interfaces.messages.sites import ArcPacket
+from interfaces.messages.sites import ArcPacket, arcs_of
 from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
@@ -152,7 +152,7 @@ class TimelineController:
         self.D = self._offset.D
         if arcs:
             known = arcs[-1].end
-            tail = packet.tail if abs(known - packet.complete_until) < _ROUNDING else ()
+            tail = arcs_of(packet.tail) if abs(known - packet.complete_until) < _ROUNDING else ()
             self._tracker.receive((*arcs, *tail), complete_until=known)
             self._ends.extend(arc.end for arc in arcs)
 
