@@ -356,6 +356,10 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
         _check_stamps(self)
 
 
+class Redo(_Command, frozen=True, omit_defaults=True, gc=False, tag="redo"):
+    """Take back the newest undo: the plan is again what it was, unless something else was commanded since."""
+
+
 class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="alter"):
     """Add an offset to the path of the tool that's planned; given again and again, it's followed.
 
@@ -433,7 +437,7 @@ def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdi
             set_field(command, name, stamp)
 
 
-Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | PositionQuery | ParameterChange
+Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | Redo | PositionQuery | ParameterChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)

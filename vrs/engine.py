@@ -29,6 +29,7 @@ from vrs.commands import (
     PlanEdit,
     Position,
     PositionQuery,
+    Redo,
     Resume,
     Retime,
     ScaleTime,
@@ -189,7 +190,7 @@ class Engine:
         return self.model.links(self.joints(t))
 
     @overload
-    def execute(self, command: MotionCommand | SteerCommand | PlanEdit) -> Receipt: ...
+    def execute(self, command: MotionCommand | SteerCommand | PlanEdit | Redo) -> Receipt: ...
     @overload
     def execute(self, command: PositionQuery) -> Position: ...
     @overload
@@ -222,6 +223,8 @@ class Engine:
                 return None
             if isinstance(checked, SteerCommand):
                 return self.scheduler.steer(checked, self._present())
+            if isinstance(checked, Redo):
+                return self.scheduler.redo(self._present())
             return self.scheduler.edit(checked, self._present())
 
     def atomic(self) -> AbstractContextManager[None]:
@@ -332,8 +335,19 @@ class Engine:
         """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""
         return self.scheduler.undo_refusal(self._present())
 
+    def redo(self) -> Receipt:
+        """Take back the newest undo: the plan is again what it was before, as far as nothing of it has passed.
+
+        Returns:
+            The receipt of the command that was undone, as it is now; or a rejection: nothing was undone, or
+            something was commanded since.
+        """
+        return self.execute(Redo())
+
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self.scheduler
+        # What was planned keeps the limits of then.
+        plan.ledger.redo_steps.clear()
         if change.name == "lateness":
             plan.lateness = word("lateness", change.value, Lateness)
             return
