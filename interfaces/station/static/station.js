@@ -3,8 +3,9 @@ import { Chain } from "./chain.js";
 import { DriveSession } from "./drivesession.js";
 import { Happenings } from "./happenings.js";
 import { App, Layout } from "./layout.js";
-import { Notices } from "./notice.js";
+import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
+import { Stop } from "./stop.js";
 import { html, observed, render } from "./ui.js";
 
 const NAME = "vrs-name";
@@ -31,7 +32,10 @@ class Station extends EventTarget {
       /** The 3D view, see twins.js; null before it's there, and where the browser draws none. */
       scene: null,
     });
+    /** What couldn't be done, said at the control that was used. */
     this.notices = new Notices(this.session);
+    /** STOP: `stop.press()`. */
+    this.stop = new Stop(this);
     /** What happened, for the strip and the plots. */
     this.happenings = new Happenings(this);
   }
@@ -65,6 +69,7 @@ class Station extends EventTarget {
 
 function Page({ station }) {
   return html`<${App} station=${station} />
+    <${Notice} notices=${station.notices} />
     <div class="spoken" aria-live="polite">${station.polite}</div>
     <div class="spoken" role="alert" aria-live="assertive" id="alert">${station.urgent}</div>`;
 }
@@ -82,7 +87,6 @@ const config = JSON.parse(root.dataset.config);
 const station = new Station(config);
 window.station = station;
 render(html`<${Page} station=${station} />`, root);
-root.append(station.notices.box);
 const { layout } = station;
 const modules = await Promise.all(config.panels.map(({ name }) => import(`./${name}.js`)));
 for (const [k, { name }] of config.panels.entries()) {
