@@ -330,6 +330,10 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
     """When [s]; None: as soon as possible."""
 
 
+class Redo(_Command, frozen=True, omit_defaults=True, gc=False, tag="redo"):
+    """Take back the newest undo: the plan is again what it was, unless something else was commanded since."""
+
+
 class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="alter"):
     """Add an offset to the path of the tool that's planned; given again and again, it's followed.
 
@@ -431,7 +435,7 @@ _CHECKS: dict[str, Callable[[str, Any], object]] = {
 _NEEDED = frozenset(_CHECKS) - {"issued_at", "execute_at", "t", "tool", "rates", "twist", "offset"}
 
 
-Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | PositionQuery | ParameterChange
+Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | Redo | PositionQuery | ParameterChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)

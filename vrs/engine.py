@@ -28,6 +28,7 @@ from vrs.commands import (
     ParameterChange,
     Position,
     PositionQuery,
+    Redo,
     Resume,
     Retime,
     ScaleTime,
@@ -187,7 +188,7 @@ class Engine:
         return self.model.links(self.joints(t))
 
     @overload
-    def execute(self, command: Edited) -> Receipt: ...
+    def execute(self, command: Edited | Redo) -> Receipt: ...
     @overload
     def execute(self, command: PositionQuery) -> Position: ...
     @overload
@@ -214,9 +215,11 @@ class Engine:
             if isinstance(checked, ParameterChange):
                 self._set_parameter(checked)
                 return None
+            if isinstance(checked, Redo):
+                return self.scheduler.redo(self._present())
             return self.scheduler.execute(checked, self._present())
 
-    def _checked(self, command: object) -> Edited | PositionQuery | ParameterChange:
+    def _checked(self, command: object) -> Edited | Redo | PositionQuery | ParameterChange:
         """The command, of a form that fits the robot."""
         return check(command, self.model)
 
@@ -333,8 +336,19 @@ class Engine:
         """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""
         return self.scheduler.undo_refusal(self._present())
 
+    def redo(self) -> Receipt:
+        """Take back the newest undo: the plan is again what it was before, as far as nothing of it has passed.
+
+        Returns:
+            The receipt of the command that was undone, as it is now; or a rejection: nothing was undone, or
+            something was commanded since.
+        """
+        return self.execute(Redo())
+
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self.scheduler
+        # What was planned keeps the limits of then.
+        plan.ledger.redo_steps.clear()
         if change.name == "lateness":
             plan.lateness = word("lateness", change.value, Lateness)
             return

@@ -275,12 +275,24 @@ class BaseScheduler(Generic[TimelineT]):
             return None
         version = self.timeline.version + 1
         if now is None or now <= last.at:
-            self.timeline = last.before.with_version(version)
-            return self.ledger.take_back(version)
+            taken, self.timeline = self.timeline, last.before.with_version(version)
+            return self.ledger.take_back(version, taken)
         if now >= self.timeline.end:
             return None
         self.timeline, notes = self.brake(now, last.command_id)
         return self.ledger.break_off(Change(version, last.command_id, now, None), notes)
+
+    def redo(self, now: float | None) -> Receipt:
+        """Take back the newest undo; see `vrs.engine.Engine.redo`."""
+        undone = self.ledger.undone(self.timeline.version)
+        if undone is None:
+            why = "there's nothing to redo: nothing was undone, or something was commanded since"
+            return self.reject(now, None, why)
+        if now is not None and now > undone.at:
+            why = f"command {undone.command_id} can't be redone: its time, {undone.at:.6g} s, has passed"
+            return self.reject(now, None, why)
+        self.timeline = undone.before.with_version(self.timeline.version + 1)
+        return self.ledger.bring_back(self.timeline.version)
 
     def undo_refusal(self, now: float | None) -> str:
         """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""

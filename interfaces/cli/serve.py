@@ -355,6 +355,7 @@ async def _serve(
         from interfaces.messages.control import Role
         from interfaces.runtime.live.operator import share_world
         from interfaces.runtime.live.twins import ArmTwins
+        from interfaces.station.plans import Plans
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -387,6 +388,8 @@ async def _serve(
                 routes.append(PageTerminalServer(room, access).route)
                 if one.val_port is not None:
                     val_room = room
+            if not one.robot.is_base:
+                routes += Plans(one.robot.arm, access, operator.clock).routes
             routes += _station(one, serving).routes
             if one.folder:
                 others.append(Mount(one.folder, routes=routes))

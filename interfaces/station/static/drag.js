@@ -11,9 +11,9 @@ const THERE = 8e-4;
 const PATIENCE = 12;
 
 export function mount(station) {
-  const { session, chain, shared } = station;
-  const { pane, scene } = shared.pane;
+  const { session, chain, shared, scene } = station;
   if (!scene) return;
+  const { pane } = scene;
   const steer = steering(station);
   const THREE = window.MeshCat.THREE;
   const handle = h("div.handle", { id: "handle", "aria-hidden": "true", title: "Drag the tool" });
@@ -26,7 +26,7 @@ export function mount(station) {
   let offset = null;
 
   /** The tool in the base frame [m], as the picture shows it. */
-  const tool = () => (shared.pane.shown ? chain.toolAt(shared.pane.shown) : null);
+  const tool = () => (station.shown ? chain.toolAt(station.shown) : null);
   // The scene's z is up; the camera lives in a frame with y up: (x, y, z) is (x, z, −y) there.
   const seen = ([x, y, z]) => new THREE.Vector3(x, z, -y);
   const back = ({ x, y, z }) => [x, -z, y];
@@ -73,7 +73,7 @@ export function mount(station) {
 
   function take(event) {
     const here = tool();
-    if (event.button !== 0 || !here || shared.pane.cursor !== null || !session.holds) return;
+    if (event.button !== 0 || !here || station.cursor !== null || !session.holds) return;
     const at = project(here);
     const box = pane.getBoundingClientRect();
     if (Math.hypot(event.clientX - box.left - at.x, event.clientY - box.top - at.y) > REACH) return;
@@ -115,7 +115,7 @@ export function mount(station) {
   /** The handle stands at the tool, and the mark where it's to go, in every frame of the picture. */
   function place() {
     const here = tool();
-    const shown = here !== null && session.holds && session.link === "live" && shared.pane.cursor === null;
+    const shown = here !== null && session.holds && session.link === "live" && station.cursor === null;
     put(handle, shown ? project(here) : null);
     put(goal, shown && target !== null ? project(target) : null);
     requestAnimationFrame(place);

@@ -128,7 +128,7 @@ export function mount(station, box) {
 
   /** The joints of the picture, ten times a second. */
   setInterval(() => {
-    const q = station.shared.pane?.shown ?? (session.now === null ? null : session.timeline?.joints(session.now));
+    const q = station.shown;
     if (!q) return;
     joints.forEach(({ value, bar, low, high }, k) => {
       write(value, station.chain.slides(k) ? `${figure(q[k], 3)} m` : degrees(q[k]));

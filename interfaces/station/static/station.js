@@ -1,6 +1,7 @@
 // The station: one session for the page, and the panels, each a component in its own place.
 import { Chain } from "./chain.js";
 import { DriveSession } from "./drivesession.js";
+import { Happenings } from "./happenings.js";
 import { App, Layout } from "./layout.js";
 import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
@@ -21,12 +22,28 @@ class Station extends EventTarget {
     this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
     this.layout = new Layout(config.panels);
     /** What panels offer each other, by the panel's name. */
-    this.shared = {};
-    observed(this, { polite: "", urgent: "" });
+    const picture = { get: () => ({ pane: this.scene?.pane, scene: this.scene, shown: this.shown, cursor: this.cursor }) };
+    this.shared = Object.defineProperty({}, "pane", picture);
+    observed(this, {
+      polite: "",
+      urgent: "",
+      /** The time of the timeline that is looked at [s]; null: now. Setting it shows another one. */
+      cursor: null,
+      /** The 3D view, see twins.js; null before it's there, and where the browser draws none. */
+      scene: null,
+    });
     /** What couldn't be done, said at the control that was used. */
     this.notices = new Notices(this.session);
     /** STOP: `stop.press()`. */
     this.stop = new Stop(this);
+    /** What happened, for the strip and the plots. */
+    this.happenings = new Happenings(this);
+  }
+
+  /** Joints of the virtual robot as the picture shows them; null where nothing is known. */
+  get shown() {
+    const t = this.cursor ?? this.session.now;
+    return t === null || !this.session.timeline ? null : this.session.timeline.joints(t);
   }
 
   /** Say something to those who listen to the page. */
