@@ -225,7 +225,7 @@ Figures = dict[str, list[float]]
 
 @contextlib.contextmanager
 def measured(figures: Figures, server: Server, pupils: list[Pupil], kind: str) -> Iterator[None]:
-    """Note how old frames are meanwhile, how long orders take, and the server's processor time for each frame sent."""
+    """Note how old frames are meanwhile, how long orders take, and the server's processor time a frame."""
     for pupil in pupils:
         pupil.ages.clear()
     busy = server.busy()
