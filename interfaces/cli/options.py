@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import asyncio
     from contextlib import AsyncExitStack
 
+    from rich.progress import Progress
+
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
@@ -245,6 +247,20 @@ def left_out(ctx: typer.Context, why: str, options: Iterable[str]) -> None:
         # One that may be repeated is () unless it's given.
         if value not in (option.get_default(ctx), ()):
             raise InvalidValueError(name, str(value), f"left out: {why}")
+
+
+def bars(before: str, after: str = "{task.completed}/{task.total}") -> Progress:
+    """Bars on standard error for what takes long, with the time so far: to be entered.
+
+    Args:
+        before: What stands before a bar, as a format of its `task`.
+        after: What stands behind it.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = TextColumn(before), BarColumn(), TextColumn(after), TimeElapsedColumn()
+    return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
 
 
 def room_of(text: str) -> Room:
