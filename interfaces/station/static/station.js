@@ -1,9 +1,11 @@
 // The station: one session for the page, and the panels, each a component in its own place.
 import { Chain } from "./chain.js";
 import { DriveSession } from "./drivesession.js";
+import { Jogging } from "./jogging.js";
 import { App, Layout } from "./layout.js";
 import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
+import { Steer } from "./steer.js";
 import { Stop } from "./stop.js";
 import { html, observed, render } from "./ui.js";
 
@@ -22,11 +24,25 @@ class Station extends EventTarget {
     this.layout = new Layout(config.panels);
     /** What panels offer each other, by the panel's name. */
     this.shared = {};
-    observed(this, { polite: "", urgent: "" });
+    // What is said to those who listen to the page; VAL-II's terminal, once its panel is there.
+    observed(this, { polite: "", urgent: "", terminal: null });
     /** What couldn't be done, said at the control that was used. */
     this.notices = new Notices(this.session);
+    /** What is held by hand: `steer.hold(who, input)`. */
+    this.steer = new Steer(this);
+    /** How an arm is jogged. */
+    this.jog = this.drives ? null : new Jogging(this);
     /** STOP: `stop.press()`. */
     this.stop = new Stop(this);
+  }
+
+  /** Why no orders can be given from here now; "" where they can. */
+  get idle() {
+    const { link, holds, lease, mayCommand } = this.session;
+    if (link !== "live") return "No connection.";
+    if (holds) return "";
+    if (!mayCommand) return "You are here to watch.";
+    return lease.state === "held" ? `${lease.holder} has control.` : "Take control first, in the bar above.";
   }
 
   /** Say something to those who listen to the page. */

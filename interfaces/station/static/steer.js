@@ -1,9 +1,12 @@
 // Steering: as long as a hand holds something, its input is sent; when it lets go, the robot comes to rest.
 
+import { observed } from "./ui.js";
+
 /** Time between two inputs [ms]; each holds for 0.2 s at the engine. */
 const PERIOD = 40;
 /** By how much stamps lie behind this page's idea of the session's time, so that none comes before its time [s]. */
 const BEHIND = 0.004;
+const BLIND = "You look at another time: press Live to steer.";
 
 export class Steer {
   constructor(station) {
@@ -14,21 +17,22 @@ export class Steer {
     this.timer = null;
     /** The newest input. */
     this.last = null;
+    // Whether the picture shows another time than now: nobody steers by that.
+    observed(this, { blind: false });
     for (const type of ["blur", "pagehide"]) window.addEventListener(type, () => this.releaseAll());
     document.addEventListener("visibilitychange", () => document.hidden && this.releaseAll());
     station.addEventListener("stopping", () => this.releaseAll({ silently: true }));
     station.on("lease", () => this.session.holds || this.releaseAll());
     station.on("link", (link) => link === "live" || this.releaseAll());
-    station.addEventListener("cursor", () => this.blind && this.releaseAll());
+    station.addEventListener("cursor", ({ detail: t }) => {
+      this.blind = t !== null;
+      if (this.blind) this.releaseAll();
+    });
   }
 
-  /** Whether the picture shows another time than now: nobody steers by that. */
-  get blind() {
-    return (this.station.shared.pane?.cursor ?? null) !== null;
-  }
-
-  get active() {
-    return this.inputs.size > 0;
+  /** Why nobody can steer now; "" where somebody can. */
+  get idle() {
+    return this.station.idle || (this.blind ? BLIND : "");
   }
 
   /**
@@ -46,7 +50,7 @@ export class Steer {
       return false;
     }
     if (this.blind) {
-      this.station.refuse("you look at another time: press Live to steer");
+      this.station.refuse(BLIND);
       released();
       return false;
     }
@@ -95,12 +99,4 @@ export class Steer {
 function stillAs({ rates, twist, frame, ...other }) {
   if (other.type === "drive") return { ...other, v: 0, w: 0 };
   return rates ? { rates: rates.map(() => 0) } : { twist: twist.map(() => 0), frame };
-}
-
-let steer = null;
-
-/** The page's only one. */
-export function steering(station) {
-  steer ??= new Steer(station);
-  return steer;
 }
