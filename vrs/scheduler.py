@@ -367,7 +367,7 @@ class Scheduler(BaseScheduler[Timeline]):
 
     @override
     def carry_out(self, command: Edited, now: float | None) -> Receipt:
-        if isinstance(command, (SteerCommand, Alter, Stop, Resume)):
+        if self.alteration is None or isinstance(command, (SteerCommand, Alter, Stop, Resume)):
             return self._act(command, now)
         return self._under_offset(partial(self._act, command, now), now)
 
