@@ -75,6 +75,11 @@ def seconds_since_1970() -> float:
     return time.time()
 
 
+def processor_time() -> float:
+    """Processor time of this thread so far [s]: it stands still while others have the processor."""
+    return time.thread_time()
+
+
 class OffsetClock:
     """Another clock, shifted: t_engine = t_user + D. Source: Doulgeri et al., section IV-A."""
 

@@ -67,12 +67,12 @@ class Station:
 
 
 def _page(robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]]) -> str:
-    """Its HTML: the empty boxes that the panels' scripts fill, and what those are told."""
+    """Its HTML: one element, which the scripts fill, and what those are told."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     templates = Environment(
         loader=PackageLoader("interfaces.station"), undefined=StrictUndefined, trim_blocks=True, autoescape=True
     )
     listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in panels]
-    config = json.dumps({"robot": robot, "panels": listed})
-    return templates.get_template("index.html").render(panels=panels, config=config, robots=robots)
+    config = json.dumps({"robot": robot, "panels": listed, "robots": robots})
+    return templates.get_template("index.html").render(config=config)

@@ -8,7 +8,6 @@ import gzip
 import hashlib
 import logging
 import math
-import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ from interfaces.stream.codec import Encoding
 from interfaces.stream.hub import Hub, HubSession
 from interfaces.stream.sockets import BoundedWebSocket
 from interfaces.timer import Turning
-from vrs.clock import Clock
+from vrs.clock import Clock, processor_time
 
 POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
@@ -216,7 +215,7 @@ class HubServer:
             while (message := await receive())["type"] != "websocket.disconnect":
                 await self._slices.turn(first=session.commands)
                 # The processor's time: what stops the whole machine is no client's fault.
-                begun, now = time.thread_time(), self.clock.now()
+                begun, now = processor_time(), self.clock.now()
                 data = message.get("bytes")
                 session.receive(message["text"] if data is None else data, now=now)
                 if not known and session.seat is not None:
@@ -226,7 +225,7 @@ class HubServer:
                     self.kick()
                 elif session.is_due(now):
                     client.wake.set()
-                work, socket.work = time.thread_time() - begun + socket.work, 0.0
+                work, socket.work = processor_time() - begun + socket.work, 0.0
                 self._slices.spend(work)
                 session.spend(work, now=self.clock.now())
                 # Meanwhile nothing more is read: it waits at the client's end.

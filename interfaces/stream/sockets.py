@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import resource
 import socket
-import time
 from asyncio.transports import BaseTransport, Transport
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -24,6 +23,7 @@ from websockets.http11 import Request
 
 from interfaces.stream.limits import Bucket, Strangers
 from vrs.checks import validated, within
+from vrs.clock import processor_time
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -268,7 +268,7 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
 
     def _read(self) -> None:
         """Read what is there, until there's a message or a moment is over."""
-        worked = time.thread_time()
+        worked = processor_time()
         begun = now = self.loop.time()
         # Once it's closed nobody takes messages any more, and the other end's farewell is read all the same.
         while self._unread and (self.queue.empty() or self.close_sent) and now < begun + MOMENT:
@@ -278,7 +278,7 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
             chunk, self._unread = self._unread[:CHUNK], self._unread[CHUNK:]
             super().data_received(chunk)
             now = self.loop.time()
-        self.work += time.thread_time() - worked
+        self.work += processor_time() - worked
         if self._unread:
             if not self.read_paused:
                 self.read_paused = True

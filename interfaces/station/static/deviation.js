@@ -81,7 +81,7 @@ export function mount(station, box) {
   const { session, layout } = station;
   const samples = new Samples(station);
   const charts = GRAPHS.map((one) => new Chart(one));
-  const colour = palette(station, again);
+  const colour = palette(again);
   const head = new PlotHead(SPANS, {
     chosen: again,
     save: () => textOf(samples.table).then((parts) => save(parts, `vrs-drive-${Math.round(session.now ?? 0)}s.csv`)),
@@ -103,7 +103,7 @@ export function mount(station, box) {
     const view = { samples, from: now - span, until: now, span, cursor: null, events: [] };
     if (at - said > SAID) say(view, (said = at));
     if (!UPlot) {
-      UPlot = import("./uplot.js").then((found) => (UPlot = found.default));
+      UPlot = import("./uplot.min.js").then((found) => (UPlot = found.default));
       return;
     }
     if (UPlot instanceof Promise) return;

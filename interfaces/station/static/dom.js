@@ -1,5 +1,7 @@
-// Elements, and numbers as people read them.
+// Elements of the panels that aren't components.
 import { OUTLINES } from "./icons.js";
+
+export { DEGREES, clockText, degrees, figure, isTyping } from "./ui.js";
 
 /**
  * An element.
@@ -47,33 +49,4 @@ export function write(element, text) {
 export function mark(element, name, value) {
   if (value === null || value === false) element.removeAttribute(name);
   else if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
-}
-
-/** Whether a key that is pressed belongs to what is written in. */
-export function isTyping(event) {
-  const target = event.target;
-  if (!(target instanceof HTMLElement)) return false;
-  if (target.isContentEditable || target.tagName === "TEXTAREA") return true;
-  return target.tagName === "INPUT" && !["range", "checkbox", "radio", "button"].includes(target.type);
-}
-
-/** Degrees of a radian. */
-export const DEGREES = 180 / Math.PI;
-
-/** A number for people, with a real minus. */
-export function figure(x, digits) {
-  if (x === null || x === undefined || !Number.isFinite(x)) return "–";
-  const text = x.toFixed(digits);
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
-}
-
-/** Radians as degrees. */
-export const degrees = (angle) => `${figure(angle * DEGREES, 1)}°`;
-
-/** Seconds of the session as m:ss.s. */
-export function clockText(t) {
-  const tenths = Math.round(Math.abs(t) * 10);
-  const minutes = Math.floor(tenths / 600);
-  const seconds = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
-  return (t < 0 ? "−" : "") + minutes + ":" + seconds;
 }

@@ -84,7 +84,6 @@ export function mount(station, box) {
 
   // Arrow keys drive again once the mouse has let go of what takes them too.
   speed.slider.addEventListener("pointerup", () => speed.slider.blur());
-  station.layout.list.addEventListener("click", (event) => event.detail && document.activeElement.blur());
 
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;

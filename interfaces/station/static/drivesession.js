@@ -1,13 +1,14 @@
 // The connection of a mobile robot's page: both robots' postures come as they are, and nothing is followed.
 import { Session } from "./session.js";
 import { NEWS } from "./tasks.js";
+import { observed } from "./ui.js";
 
 export class DriveSession extends Session {
   constructor(who) {
     super(who);
     this.welcomes = "mobile-welcome";
-    /** What the robot does by itself, what it sees, and the known map; null before they're told. */
-    this.tasks = this.seen = this.plan = null;
+    // What the robot does by itself, what it sees, and the known map; null before they're told.
+    observed(this, { tasks: null, seen: null, plan: null });
   }
 
   makeReader() {

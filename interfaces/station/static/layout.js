@@ -1,91 +1,111 @@
-// The page's frame: tabs at the right, and the splitter between them and the 3D view.
-import { h, icon } from "./dom.js";
+// The page's frame: the bar, the 3D view with the panels' tabs beside it, and the strip; each panel in its own place.
+import { html, Icon, observed, useEffect, useRef, useState } from "./ui.js";
 
 const WIDTH = "vrs-side-width";
 const [NARROWEST, WIDEST, USUAL] = [320, 640, 364];
 const STEP = 24;
 
+/** Which tab is shown. */
 export class Layout {
-  constructor(root, panels) {
-    this.root = root;
-    this.list = document.getElementById("tabs");
-    this.list.setAttribute("role", "tablist");
-    this.list.setAttribute("aria-label", "Panels");
-    this.tabs = new Map();
-    for (const panel of panels) if (panel.place === "side") this.add(panel);
-    this.list.addEventListener("keydown", (event) => this.walk(event));
-    this.split(document.getElementById("splitter"));
+  constructor(panels) {
+    this.panels = panels;
+    const side = panels.filter(({ place }) => place === "side").map(({ name }) => name);
+    observed(this, {
+      shown: side[0],
+      /** The panels that are there so far, by name: what their modules export. */
+      modules: {},
+    });
   }
 
-  /** Give a panel its tab. */
-  add(panel) {
-    const card = document.getElementById("card-" + panel.name);
-    const tab = h(
-      "button.tab",
-      { type: "button", role: "tab", id: "tab-" + panel.name, "aria-controls": card.id, tabindex: -1 },
-      panel.icon ? icon(panel.icon) : null,
-      panel.title,
-    );
-    card.setAttribute("role", "tabpanel");
-    card.setAttribute("aria-labelledby", tab.id);
-    card.hidden = true;
-    tab.addEventListener("click", () => this.show(panel.name));
-    this.tabs.set(panel.name, { tab, card });
-    this.list.append(tab);
-    if (!this.shown) this.show(panel.name);
-  }
-
-  /** Show a panel of the side. */
   show(name) {
     this.shown = name;
-    for (const [other, { tab, card }] of this.tabs) {
-      const chosen = other === name;
-      tab.setAttribute("aria-selected", String(chosen));
-      tab.tabIndex = chosen ? 0 : -1;
-      card.hidden = !chosen;
-    }
   }
+}
 
-  walk(event) {
-    const names = [...this.tabs.keys()].filter((name) => this.tabs.get(name).tab.isConnected);
-    const at = names.indexOf(this.shown);
-    const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: names.length - 1 }[event.key];
+export function App({ station }) {
+  const { panels, robots } = station.config;
+  const at = (place) => panels.filter((panel) => panel.place === place)
+    .map((panel) => html`<${Card} key=${panel.name} station=${station} panel=${panel} />`);
+  return html`
+    <div id="bar"><h1 class="name">VRS teleop</h1>
+      ${robots.length > 0 && html`<nav id="robots" aria-label="Robots">
+        ${robots.map(([name, page, here]) => html`<a href=${page} aria-current=${here && "page"}>${name}</a>`)}</nav>`}
+      <div id="bar-panels">${at("header")}</div></div>
+    <div id="work">
+      <div id="pane-box">${at("pane")}</div>
+      <${Splitter} />
+      <div id="side"><${Tabs} station=${station} /><div id="tab-panels">${at("side")}</div></div>
+    </div>
+    <div id="strip-box">${at("strip")}</div>
+    ${at("nowhere")}`;
+}
+
+/** A panel's place: its component, or the element that its `mount` fills. */
+function Card({ station, panel: { name, place } }) {
+  const { layout } = station;
+  const module = layout.modules[name];
+  const tabbed = place === "side" ? { role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: layout.shown !== name } : {};
+  const box = useRef(null);
+  useEffect(() => module?.mount?.(station, box.current), [module]);
+  return html`<div id=${`card-${name}`} class="card" ...${tabbed}>
+    <div id=${`panel-${name}`} class=${`panel panel-${name}`} ref=${box}>${module?.Panel && html`<${module.Panel} station=${station} />`}</div></div>`;
+}
+
+function Tabs({ station: { layout, drives } }) {
+  const side = layout.panels.filter(({ place }) => place === "side");
+
+  function walk(event) {
+    const at = side.findIndex(({ name }) => name === layout.shown);
+    const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: side.length - 1 }[event.key];
     if (to === undefined) return;
     event.preventDefault();
     event.stopPropagation();
-    const name = names[(to + names.length) % names.length];
-    this.show(name);
-    this.tabs.get(name).tab.focus();
+    const { name } = side[(to + side.length) % side.length];
+    layout.show(name);
+    document.getElementById(`tab-${name}`).focus();
   }
 
-  split(splitter) {
-    const set = (width) => {
-      const most = Math.min(WIDEST, window.innerWidth - 560);
-      const now = Math.round(Math.max(NARROWEST, Math.min(most, width)));
-      this.root.style.setProperty("--side", now + "px");
-      splitter.setAttribute("aria-valuenow", now);
-      localStorage.setItem(WIDTH, now);
-      return now;
-    };
-    const given = { role: "separator", "aria-orientation": "vertical", "aria-label": "Width of the panels" };
-    const bounds = { "aria-valuemin": NARROWEST, "aria-valuemax": WIDEST, tabindex: 0 };
-    for (const [name, value] of Object.entries({ ...given, ...bounds })) splitter.setAttribute(name, value);
-    let width = set(Number(localStorage.getItem(WIDTH)) || USUAL);
-    splitter.addEventListener("keydown", (event) => {
-      const way = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];
-      if (way === undefined) return;
-      event.preventDefault();
-      event.stopPropagation();
-      width = set(width + way);
-    });
-    splitter.addEventListener("pointerdown", (event) => {
-      splitter.setPointerCapture(event.pointerId);
-      const right = width + event.clientX;
-      const move = (moved) => (width = set(right - moved.clientX));
-      splitter.addEventListener("pointermove", move);
-      splitter.addEventListener("lostpointercapture", () => splitter.removeEventListener("pointermove", move), {
-        once: true,
-      });
-    });
+  function choose({ detail, currentTarget }, name) {
+    layout.show(name);
+    // Arrow keys drive; who came here by them walks on by them.
+    if (drives && detail) currentTarget.blur();
   }
+
+  return html`<div id="tabs" role="tablist" aria-label="Panels" onKeyDown=${walk}>
+    ${side.map(({ name, title, icon }) => {
+      const chosen = name === layout.shown;
+      return html`<button class="tab" type="button" role="tab" id=${`tab-${name}`} aria-controls=${`card-${name}`}
+        aria-selected=${String(chosen)} tabindex=${chosen ? 0 : -1} onClick=${(event) => choose(event, name)}>
+        ${icon && html`<${Icon} name=${icon} />`}${title}</button>`;
+    })}</div>`;
+}
+
+/** Between the 3D view and the panels: drawn, or moved by arrow keys. */
+function Splitter() {
+  const [width, setWidth] = useState(Number(localStorage.getItem(WIDTH)) || USUAL);
+  const most = Math.min(WIDEST, window.innerWidth - 560);
+  const now = Math.round(Math.max(NARROWEST, Math.min(most, width)));
+  const held = useRef(null);
+  useEffect(() => {
+    document.getElementById("station").style.setProperty("--side", `${now}px`);
+    localStorage.setItem(WIDTH, now);
+  }, [now]);
+
+  function key(event) {
+    const way = { ArrowLeft: STEP, ArrowRight: -STEP }[event.key];
+    if (way === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    setWidth(now + way);
+  }
+
+  function grab(event) {
+    event.currentTarget.setPointerCapture(event.pointerId);
+    held.current = now + event.clientX;
+  }
+
+  const move = (event) => held.current !== null && setWidth(held.current - event.clientX);
+  return html`<div id="splitter" role="separator" aria-orientation="vertical" aria-label="Width of the panels" tabindex="0"
+    aria-valuemin=${NARROWEST} aria-valuemax=${WIDEST} aria-valuenow=${now} onKeyDown=${key} onPointerDown=${grab}
+    onPointerMove=${move} onLostPointerCapture=${() => (held.current = null)}></div>`;
 }

@@ -1,4 +1,6 @@
 // What stands around live plots: the window that is shown, the file to save, what they show, and their colours.
+import { theme } from "./theme.js";
+import { effect, untracked } from "./ui.js";
 import { h, mark } from "./dom.js";
 
 /** Style sheets of plots. */
@@ -50,14 +52,16 @@ export function notes(graphs, ...more) {
 
 /**
  * Gives the theme's colours by name, each looked up once a theme.
- * @param {EventTarget} station tells of another theme
- * @param {function(): void} changed is called then
+ * @param {function(): void} changed is called when there's another theme
  */
-export function palette(station, changed) {
+export function palette(changed) {
   const known = new Map();
-  station.addEventListener("theme", () => {
+  let shown = theme();
+  effect(() => {
+    if (theme() === shown) return;
+    shown = theme();
     known.clear();
-    changed();
+    untracked(changed);
   });
   return (name) => {
     if (!known.has(name)) known.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());

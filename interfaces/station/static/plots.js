@@ -52,7 +52,7 @@ class Plots {
     this.figures = new Figures();
     this.parts = [...this.charts, this.figures];
     this.head = new PlotHead(SPANS, { chosen: () => this.choose(), save: () => this.save() });
-    this.colour = palette(station, () => this.again());
+    this.colour = palette(() => this.again());
     this.basis = "timeline";
     this.paths = null;
     this.compared = this.said = this.spoken = -Infinity;
@@ -128,7 +128,7 @@ class Plots {
     if (document.hidden || !this.shown) return;
     const view = this.view();
     if (!view) return;
-    this.library ??= import("./uplot.js").then(({ default: UPlot }) => {
+    this.library ??= import("./uplot.min.js").then(({ default: UPlot }) => {
       this.UPlot = UPlot;
     });
     const at = performance.now();

@@ -2,6 +2,7 @@
 import { ClockSync, Reader } from "./vrs.js";
 import { decode, LEASED } from "./protocol.js";
 import { Orders } from "./orders.js";
+import { observed } from "./ui.js";
 import { Wire } from "./wire.js";
 
 /** Silence after which what is shown is stale, and after which the connection counts as lost [s]. */
@@ -19,25 +20,28 @@ const ROLES = ["admin", "operator", "viewer"];
 const seconds = () => performance.now() / 1000;
 
 /**
- * Events: "link" (how the connection is), "welcome", "lease", "state" (the real robot), "edit" (of the timeline),
+ * What is known of the server, as fields that components follow by reading them; and events: "link" (how the connection is), "welcome", "lease", "state" (the real robot), "edit" (of the timeline),
  * "network" (the way to the robot), "rerouted" (that it has changed), "order" and "outcome" (of commands), "wish" (a request), "problem" (what couldn't be done), "locked" (a token is asked for).
  */
 export class Session extends EventTarget {
   /** @param {{name: string, token: ?string}} who */
   constructor({ name, token }) {
     super();
-    this.name = name;
     this.token = token;
-    /** "connecting", "live", "stale", "lost" or "locked". */
-    this.link = "connecting";
     /** Type of the message that lets this page in. */
     this.welcomes = "welcome";
-    this.welcome = null;
-    this.lease = { state: "free" };
-    this.state = null;
-    /** How the way to the robot is; null before that was asked. */
-    this.network = null;
-    this.epoch = null;
+    observed(this, {
+      name,
+      /** "connecting", "live", "stale", "lost" or "locked". */
+      link: "connecting",
+      welcome: null,
+      lease: { state: "free" },
+      /** The real robot; null before it was told. */
+      state: null,
+      /** How the way to the robot is; null before that was asked. */
+      network: null,
+      epoch: null,
+    });
     this.sync = new ClockSync();
     this.reader = null;
     this.orders = new Orders((message) => this.send(message));

@@ -1,16 +1,17 @@
-// The station: one session for the page, and the panels, each mounted into its own element.
+// The station: one session for the page, and the panels, each a component in its own place.
 import { Chain } from "./chain.js";
-import { h } from "./dom.js";
 import { DriveSession } from "./drivesession.js";
-import { Layout } from "./layout.js";
-import { Notices } from "./notice.js";
+import { App, Layout } from "./layout.js";
+import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
+import { Stop } from "./stop.js";
+import { html, observed, render } from "./ui.js";
 
 const NAME = "vrs-name";
 
 /** What panels are given: the session, what the robot is, a voice for screen readers, and what they share. */
 class Station extends EventTarget {
-  constructor(root, config) {
+  constructor(config) {
     super();
     this.config = config;
     /** Whether the robot drives on arcs, and no joints of it move on polynomials. */
@@ -18,17 +19,19 @@ class Station extends EventTarget {
     /** Links and tool at joints; a robot that drives has none. */
     this.chain = this.drives ? null : new Chain(config.robot);
     this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
-    this.layout = new Layout(root, config.panels);
+    this.layout = new Layout(config.panels);
     /** What panels offer each other, by the panel's name. */
     this.shared = {};
-    this.polite = root.appendChild(h("div.spoken", { "aria-live": "polite" }));
-    this.notices = new Notices(this.session, root);
-    this.urgent = root.appendChild(h("div.spoken", { role: "alert", "aria-live": "assertive", id: "alert" }));
+    observed(this, { polite: "", urgent: "" });
+    /** What couldn't be done, said at the control that was used. */
+    this.notices = new Notices(this.session);
+    /** STOP: `stop.press()`. */
+    this.stop = new Stop(this);
   }
 
   /** Say something to those who listen to the page. */
   announce(text, { urgent = false } = {}) {
-    (urgent ? this.urgent : this.polite).textContent = text;
+    this[urgent ? "urgent" : "polite"] = text;
   }
 
   /** Say at the control that was used why something isn't done; nothing of "". */
@@ -47,6 +50,13 @@ class Station extends EventTarget {
   }
 }
 
+function Page({ station }) {
+  return html`<${App} station=${station} />
+    <${Notice} notices=${station.notices} />
+    <div class="spoken" aria-live="polite">${station.polite}</div>
+    <div class="spoken" role="alert" aria-live="assertive" id="alert">${station.urgent}</div>`;
+}
+
 function myName() {
   const known = localStorage.getItem(NAME);
   if (known) return known;
@@ -57,14 +67,15 @@ function myName() {
 
 const root = document.getElementById("station");
 const config = JSON.parse(root.dataset.config);
-const station = new Station(root, config);
+const station = new Station(config);
 window.station = station;
-const { panels } = config;
-const modules = await Promise.all(panels.map((panel) => import(`./${panel.name}.js`)));
-for (const [k, panel] of panels.entries()) {
+render(html`<${Page} station=${station} />`, root);
+const { layout } = station;
+const modules = await Promise.all(config.panels.map(({ name }) => import(`./${name}.js`)));
+for (const [k, { name }] of config.panels.entries()) {
   // A task each: in one, all of them would hold the page up.
+  layout.modules = { ...layout.modules, [name]: modules[k] };
   await new Promise((resolve) => setTimeout(resolve));
-  modules[k].mount(station, document.getElementById(`panel-${panel.name}`));
 }
 root.dataset.ready = "";
 station.dispatchEvent(new Event("ready"));

@@ -1,5 +1,7 @@
 // VAL-II's monitor: a terminal of this page at the server's controller. Lines are edited here, and sent whole.
 import { h, icon, write } from "./dom.js";
+import { theme } from "./theme.js";
+import { effect } from "./ui.js";
 import { Editor } from "./lineedit.js";
 
 /** Lines that can be scrolled back to. */
@@ -14,9 +16,9 @@ const [SMALL, USUAL, WIDE] = [11, 13, 460];
 const STYLES = { answer: "", typed: "\x1b[1m", note: "\x1b[36m", error: "\x1b[31m" };
 const OFF = "\x1b[0m";
 const COLOURS = {
-  false: { background: "#ffffff", foreground: "#18202c", cursor: "#1f6fd6", cursorAccent: "#ffffff", cyan: "#3d5a73",
+  light: { background: "#ffffff", foreground: "#18202c", cursor: "#1f6fd6", cursorAccent: "#ffffff", cyan: "#3d5a73",
     red: "#b3261e", selectionBackground: "#bcd6fa" },
-  true: { background: "#10151b", foreground: "#e7ecf3", cursor: "#6aa9ff", cursorAccent: "#10151b", cyan: "#93b4cf",
+  dark: { background: "#10151b", foreground: "#e7ecf3", cursor: "#6aa9ff", cursorAccent: "#10151b", cyan: "#93b4cf",
     red: "#ff8a80", selectionBackground: "#2c527d" },
 };
 
@@ -58,7 +60,7 @@ export function mount(station, box) {
     const [{ Terminal }, { FitAddon }] = await Promise.all([import("./xterm.min.js"), import("./xterm-fit.min.js")]);
     term = new Terminal({
       convertEol: false, cursorBlink: false, fontFamily: "ui-monospace, 'DejaVu Sans Mono', Menlo, Consolas, monospace",
-      fontSize: USUAL, scrollback: SCROLLBACK, screenReaderMode: true, theme: COLOURS[station.shared.theme.dark],
+      fontSize: USUAL, scrollback: SCROLLBACK, screenReaderMode: true, theme: COLOURS[theme()],
     });
     fit = new FitAddon();
     term.loadAddon(fit);
@@ -68,7 +70,7 @@ export function mount(station, box) {
     editor = new Editor(term, { line: typed, interrupt: () => send({ type: "interrupt" }), complete });
     term.attachCustomKeyEventHandler(key);
     term.onData((data) => connected() && editor.take(data));
-    station.addEventListener("theme", ({ detail }) => (term.options.theme = COLOURS[detail]));
+    effect(() => (term.options.theme = COLOURS[theme()]));
     fitted();
     open();
   }

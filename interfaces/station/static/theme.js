@@ -1,37 +1,26 @@
 // Light or dark: as the system has it, until somebody chooses.
-import { draw, h, icon } from "./dom.js";
+import { effect, html, Icon, signal } from "./ui.js";
 
 const KEY = "vrs-theme";
+const system = window.matchMedia("(prefers-color-scheme: dark)");
+const chosen = signal(localStorage.getItem(KEY));
+const preferred = signal(system.matches ? "dark" : "light");
+system.addEventListener("change", () => (preferred.value = system.matches ? "dark" : "light"));
 
-export function mount(station, box) {
-  const system = window.matchMedia("(prefers-color-scheme: dark)");
-  const symbol = icon("dark_mode");
-  const button = h("button.quiet", { type: "button", id: "theme", onclick: toggle }, symbol);
-  box.append(button);
+/** "light" or "dark". */
+export const theme = () => chosen.value ?? preferred.value;
+effect(() => (document.documentElement.dataset.theme = theme()));
 
-  function dark() {
-    const chosen = localStorage.getItem(KEY);
-    return chosen === null ? system.matches : chosen === "dark";
-  }
+export function Panel() {
+  const other = theme() === "dark" ? "light" : "dark";
 
   function toggle() {
-    const wanted = dark() ? "light" : "dark";
-    if ((wanted === "dark") === system.matches) localStorage.removeItem(KEY);
-    else localStorage.setItem(KEY, wanted);
-    show();
+    if (other === preferred.value) localStorage.removeItem(KEY);
+    else localStorage.setItem(KEY, other);
+    chosen.value = localStorage.getItem(KEY);
   }
 
-  function show() {
-    const is = dark();
-    document.documentElement.dataset.theme = is ? "dark" : "light";
-    draw(symbol, is ? "light_mode" : "dark_mode");
-    const label = is ? "Use light colours" : "Use dark colours";
-    button.setAttribute("aria-label", label);
-    button.title = label;
-    station.dispatchEvent(new CustomEvent("theme", { detail: is }));
-  }
-
-  station.shared.theme = { get dark() { return dark(); } };
-  system.addEventListener("change", show);
-  show();
+  const label = `Use ${other} colours`;
+  return html`<button class="quiet" type="button" id="theme" aria-label=${label} title=${label} onClick=${toggle}>
+    <${Icon} name=${other + "_mode"} /></button>`;
 }

@@ -1,5 +1,7 @@
 // What the 3D views of all robots share: the pane with its scene, a legend that hides parts, a badge, and words across.
 import { draw, h, icon, mark, write } from "./dom.js";
+import { theme } from "./theme.js";
+import { effect } from "./ui.js";
 
 const OLD = {
   stale: ["hourglass_empty", "Stale: what you see is old"],
@@ -56,9 +58,8 @@ export class Viewport {
       take: (data) => scene.take(data),
       state: () => {},
     });
-    station.addEventListener("theme", (event) => scene.paint(event.detail));
+    effect(() => scene.paint(theme() === "dark"));
     station.addEventListener("unlocked", () => connection.connect());
-    scene.paint(station.shared.theme?.dark ?? document.documentElement.dataset.theme === "dark");
     connection.connect();
   }
 
