@@ -13,7 +13,7 @@ import time
 from functools import partial
 from typing import TYPE_CHECKING
 
-from benchmarks.timing import seconds
+from benchmarks.timing import seconds, yardstick
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Senses, SonarModel
@@ -94,6 +94,26 @@ def whole_runs(length: float = 60.0, rounds: int = 3) -> dict[str, float]:
     }
 
 
+def in_yardsticks(length: float = 60.0, rounds: int = 9) -> float:
+    """Processor time of a run by `timeline` with metrics over that of the yardstick beside it, median of rounds."""
+    from interfaces.lab.driving.run import run
+    from interfaces.runs.drive_run import DriveCase
+    from interfaces.teleop.architectures import Transport
+
+    case = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "figure-eight", 1, length)
+    run(case)
+    found = []
+    for _ in range(rounds):
+        before = yardstick()
+        cost = 1e6 * seconds(lambda: run(case).compare())
+        found.append(cost / statistics.median(before + yardstick()))
+    return statistics.median(found)
+
+
+EARLIER = 4060
+"""What `in_yardsticks` gave of commit 6c55945, before the laboratory drove the sites that run live."""
+
+
 def many_runs(count: int, length: float = 120.0) -> float:
     """Seconds by the clock that laboratory runs take on two workers, with metrics."""
     from interfaces.lab.driving.sweep import cases, measure, sweep
@@ -115,7 +135,7 @@ def part() -> Part:
     from interfaces.teleop.architectures import ARCHITECTURES
 
     found = measure() | whole_runs()
-    seconds = many_runs(RUNS)
+    seconds, relative = many_runs(RUNS), in_yardsticks()
 
     def row(what: str, name: str, asked: float | None, note: str = "") -> Result:
         bar = Bar(median=None if asked is None else 1e6 / asked)
@@ -139,6 +159,13 @@ def part() -> Part:
                 Cost(1e6 * seconds / RUNS),
                 bar=Bar(median=0.24e6),
                 note=f"{seconds * 1000 / RUNS:.0f} s for 1,000",
+            ),
+            Result(
+                "a run of 60 s by timeline, whatever the machine's pace",
+                Cost(relative),
+                "yardsticks",
+                Bar(median=1.1 * EARLIER),
+                note=f"{relative / EARLIER:.2f} times what it took before it drove the sites that run live",
             ),
         ),
     )
