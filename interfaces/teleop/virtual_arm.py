@@ -86,9 +86,7 @@ class LoggedEngine(Engine):
             return super().execute(command)
         with self.atomic():
             refused, newest = self._refusal(), self.newest
-            answer: Receipt | None = (
-                super().execute(command) if refused is None else self.refuse(command, *refused)  # type: ignore[arg-type]
-            )
+            answer: Receipt | None = super().execute(command) if refused is None else self.refuse(command, *refused)
             self._tell(CommandRecord(0, self.now(), command, answer, refused is not None), newest)
             return answer
 
@@ -402,7 +400,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
             clock.set(max(entry.at, clock.now()))
             try:
                 if entry.command is not None:
-                    expected.execute(entry.command)  # type: ignore[arg-type]
+                    expected.execute(entry.command)
             except VrsError:
                 continue
         if _differs(self.engine.timeline, expected.timeline, now):
