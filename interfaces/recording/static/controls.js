@@ -58,6 +58,7 @@ window.VrsControls = class {
     const step = (way) => (shift) => this.wish("step", { by: way * (shift ? 1 : VrsControls.FRAME) });
     return {
       " ": acts.play,
+      k: acts.play,
       Home: acts["to-start"],
       End: acts["to-end"],
       PageUp: () => this.wish("skip", { by: 10 }),

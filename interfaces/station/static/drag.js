@@ -11,16 +11,16 @@ const PATIENCE = 12;
 
 export function Panel({ station }) {
   const [handle, goal] = [useRef(null), useRef(null)];
-  useEffect(() => follow(station, handle.current, goal.current), []);
+  useEffect(() => follow(station, handle.current, goal.current), [station.scene]);
   return html`<div class="handle" id="handle" ref=${handle} aria-hidden="true" title="Drag the tool" hidden></div>
     <div class="goal" id="goal" ref=${goal} aria-hidden="true" hidden></div>`;
 }
 
 /** Let the handle be taken, and the tool follow it. */
 function follow(station, handle, goal) {
-  const { session, steer, chain, shared } = station;
-  const { pane, scene } = shared.pane;
+  const { session, steer, chain, scene } = station;
   if (!scene) return;
+  const { pane } = scene;
   const THREE = window.MeshCat.THREE;
   /** Where the tool is to go, in the base frame [m]; null while nothing is dragged. */
   let target = null;
@@ -29,7 +29,7 @@ function follow(station, handle, goal) {
   let offset = null;
 
   /** The tool in the base frame [m], as the picture shows it. */
-  const tool = () => (shared.pane.shown ? chain.toolAt(shared.pane.shown) : null);
+  const tool = () => (station.shown ? chain.toolAt(station.shown) : null);
   // The scene's z is up; the camera lives in a frame with y up: (x, y, z) is (x, z, −y) there.
   const seen = ([x, y, z]) => new THREE.Vector3(x, z, -y);
   const back = ({ x, y, z }) => [x, -z, y];
@@ -76,7 +76,7 @@ function follow(station, handle, goal) {
 
   function take(event) {
     const here = tool();
-    if (event.button !== 0 || !here || shared.pane.cursor !== null || !session.holds) return;
+    if (event.button !== 0 || !here || station.cursor !== null || !session.holds) return;
     const at = project(here);
     const box = pane.getBoundingClientRect();
     if (Math.hypot(event.clientX - box.left - at.x, event.clientY - box.top - at.y) > REACH) return;
@@ -118,7 +118,7 @@ function follow(station, handle, goal) {
   /** The handle stands at the tool, and the mark where it's to go, in every frame of the picture. */
   function place() {
     const here = tool();
-    const shown = here !== null && session.holds && session.link === "live" && shared.pane.cursor === null;
+    const shown = here !== null && session.holds && session.link === "live" && station.cursor === null;
     put(handle, shown ? project(here) : null);
     put(goal, shown && target !== null ? project(target) : null);
     requestAnimationFrame(place);

@@ -38,8 +38,7 @@ export function Panel({ station }) {
   const asked = useRef({});
 
   useEvery(LOOK, () => {
-    const { shown } = station.shared.pane ?? {};
-    jog.q = shown ?? (session.now === null ? null : session.timeline?.joints(session.now)) ?? jog.q;
+    jog.q = station.shown ?? jog.q;
   });
   useOn(window, "keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;

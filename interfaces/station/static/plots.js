@@ -4,7 +4,7 @@ import { save, textOf } from "./csv.js";
 import { clockText, h, mark, write } from "./dom.js";
 import { Figures } from "./figures.js";
 import { graphs } from "./graphs.js";
-import { Happenings, KINDS } from "./happenings.js";
+import { KINDS } from "./happenings.js";
 import { PlotHead, loadStyles, notes, palette } from "./plothead.js";
 import { Samples } from "./samples.js";
 
@@ -47,7 +47,7 @@ class Plots {
     this.station = station;
     this.session = station.session;
     this.samples = new Samples(station);
-    this.happenings = new Happenings(station);
+    this.happenings = station.happenings;
     this.charts = graphs(this.samples.chain).map((graph) => new Chart(graph));
     this.figures = new Figures();
     this.parts = [...this.charts, this.figures];
@@ -108,7 +108,7 @@ class Plots {
     const { now } = this.session;
     if (now === null) return null;
     const [span] = this.head.span;
-    const cursor = this.station.shared.pane?.cursor ?? null;
+    const cursor = this.station.cursor;
     const until = cursor === null ? now : Math.min(now, cursor + span / 2);
     return {
       samples: this.samples,

@@ -1,12 +1,22 @@
 // Steering: as long as a hand holds something, its input is sent; when it lets go, the robot comes to rest.
 
-import { observed } from "./ui.js";
-
 /** Time between two inputs [ms]; each holds for 0.2 s at the engine. */
 const PERIOD = 40;
 /** By how much stamps lie behind this page's idea of the session's time, so that none comes before its time [s]. */
 const BEHIND = 0.004;
 const BLIND = "You look at another time: press Live to steer.";
+
+/** What the strip calls steering, by what is held; of the rest by what is asked for. */
+const BY = { drag: "tool dragged", stick: "tool by stick", pad: "tool by gamepad" };
+
+const AXES = ["tool x", "tool y", "tool z", "turn x", "turn y", "turn z"];
+
+/** What an input moves, in a word or two. */
+function steered({ rates, twist }) {
+  const asked = rates ?? twist ?? [];
+  const k = asked.findIndex((speed) => speed !== 0);
+  return k < 0 ? "" : `${rates ? `J${k + 1}` : AXES[k]} ${asked[k] < 0 ? "−" : "+"}`;
+}
 
 export class Steer {
   constructor(station) {
@@ -17,17 +27,17 @@ export class Steer {
     this.timer = null;
     /** The newest input. */
     this.last = null;
-    // Whether the picture shows another time than now: nobody steers by that.
-    observed(this, { blind: false });
     for (const type of ["blur", "pagehide"]) window.addEventListener(type, () => this.releaseAll());
     document.addEventListener("visibilitychange", () => document.hidden && this.releaseAll());
     station.addEventListener("stopping", () => this.releaseAll({ silently: true }));
     station.on("lease", () => this.session.holds || this.releaseAll());
     station.on("link", (link) => link === "live" || this.releaseAll());
-    station.addEventListener("cursor", ({ detail: t }) => {
-      this.blind = t !== null;
-      if (this.blind) this.releaseAll();
-    });
+    station.addEventListener("cursor", () => this.blind && this.releaseAll());
+  }
+
+  /** Whether the picture shows another time than now: nobody steers by that. */
+  get blind() {
+    return this.station.cursor !== null;
   }
 
   /** Why nobody can steer now; "" where somebody can. */
@@ -67,7 +77,7 @@ export class Steer {
     if (!this.inputs.delete(who) || this.inputs.size) return;
     clearInterval(this.timer);
     this.timer = null;
-    if (!silently && this.last) this.give(stillAs(this.last));
+    if (!silently && this.last) this.give(stillAs(this.last), this.label);
   }
 
   releaseAll(how) {
@@ -80,18 +90,19 @@ export class Steer {
   send() {
     const [who, { input, released }] = [...this.inputs].at(-1);
     const wanted = input();
-    if (wanted !== null) this.give((this.last = wanted));
+    if (wanted !== null) this.give((this.last = wanted), BY[who] ?? steered(wanted));
     else {
       this.release(who);
       released();
     }
   }
 
-  give(wanted) {
+  give(wanted, label) {
+    this.label = label;
     const session = this.session;
     if (!session.holds || session.link !== "live" || session.orders.congested) return;
     const behind = Math.min(session.sync.uncertainty(performance.now() / 1000), 0.05) + BEHIND;
-    session.order({ type: "steer", ...wanted, issued_at: session.now - behind });
+    session.order({ type: "steer", ...wanted, issued_at: session.now - behind }, label);
   }
 }
 

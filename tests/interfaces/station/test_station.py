@@ -165,7 +165,7 @@ def test_the_tool_goes_where_it_is_dragged(page: Page) -> None:
     start = page.get(TOOL)
     at = page.get(f"station.drag.project({TOOL})")
     x, y = pane["x"] + at["x"], pane["y"] + at["y"]
-    camera = page.get("station.shared.pane.scene.viewer.camera.position.toArray()")
+    camera = page.get("station.scene.viewer.camera.position.toArray()")
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     page.page.mouse.move(x - 70, y - 45, steps=6)
@@ -179,7 +179,7 @@ def test_the_tool_goes_where_it_is_dragged(page: Page) -> None:
     assert page.get(TOOL) == pytest.approx(target, abs=0.005)
     real = page.get("station.chain.toolAt(station.session.state.q)")
     assert real == pytest.approx(target, abs=0.005)
-    assert page.get("station.shared.pane.scene.viewer.camera.position.toArray()") == pytest.approx(camera)
+    assert page.get("station.scene.viewer.camera.position.toArray()") == pytest.approx(camera)
 
 
 def scheduled(page: Page) -> dict[str, tuple[float, float]]:
@@ -294,11 +294,11 @@ def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     page.page.mouse.down()
     page.page.mouse.move(track["x"] + 5, track["y"] + 90, steps=3)
     page.page.mouse.up()
-    shown = page.get("station.shared.pane.cursor")
+    shown = page.get("station.cursor")
     assert shown < page.get("station.session.now") - 5
     assert "Confirmed" in page.page.locator("#badge").text_content()
     assert "another time" in page.page.locator("#banner").text_content()
-    drawn = "station.shared.pane.scene.node('vrs', '%s', 'body', '6').position.toArray()"
+    drawn = "station.scene.node('vrs', '%s', 'body', '6').position.toArray()"
     then = page.get(f"station.chain.links(station.session.timeline.joints({shown})).at(-1).slice(12, 15)")
     assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
     page.page.select_option("#when", "now")
@@ -313,7 +313,7 @@ def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     assert page.virtual == pytest.approx(before, abs=1e-9)
     page.page.click("[data-pose=nominal]")
     page.until(lambda: moved(page, 0.3, before))
-    assert page.get("station.shared.pane.cursor") == shown
+    assert page.get("station.cursor") == shown
     page.shoot("past")
     assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
     page.page.click("#live")
