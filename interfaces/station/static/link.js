@@ -57,9 +57,11 @@ function Door({ station }) {
   const locked = session.link === "locked";
   const [dialog, input] = [useRef(null), useRef(null)];
   useEffect(() => {
-    if (!locked) return;
-    sessionStorage.removeItem("token");
-    dialog.current.showModal();
+    if (!locked) dialog.current.close();
+    else {
+      sessionStorage.removeItem("token");
+      dialog.current.showModal();
+    }
   }, [locked]);
 
   function enter() {
