@@ -1,5 +1,5 @@
 // What panels share by which somebody moves a robot: buttons that are held, how fast, and who may.
-import { html, observed, useEffect, useRef, useSignal } from "./ui.js";
+import { barred, html, observed, useEffect, useRef, useSignal } from "./ui.js";
 
 /**
  * A button that steers for as long as it's held, by pointer or by Enter.
@@ -28,8 +28,8 @@ export function Held({ steer, source, input, once = () => false, why = "", title
     start();
   }
 
-  return html`<button class="held" type="button" aria-pressed=${String(pressed.value)} aria-disabled=${why ? "true" : undefined}
-    title=${why || title} onPointerDown=${point} onPointerUp=${end} onPointerCancel=${end} onLostPointerCapture=${end} onBlur=${end}
+  return html`<button class="held" type="button" aria-pressed=${String(pressed.value)} ...${barred(why, title)}
+    onPointerDown=${point} onPointerUp=${end} onPointerCancel=${end} onLostPointerCapture=${end} onBlur=${end}
     onKeyDown=${(event) => event.key === "Enter" && !event.repeat && start()} onKeyUp=${(event) => event.key === "Enter" && end()}
     onContextMenu=${(event) => event.preventDefault()} ...${others}>${children}</button>`;
 }
@@ -61,8 +61,9 @@ export const letGo = (event) => event.currentTarget.blur();
 
 export function SpeedRow({ speed, children }) {
   return html`<div class="row speed"><label for="speed">Speed</label>
-    <input id="speed" type="range" min="5" max="100" step="5" value=${speed.percent} onInput=${({ target }) => speed.set(target.value)}
-      onPointerUp=${letGo} /><output for="speed">${speed.percent} %</output>${children}</div>`;
+    <input id="speed" type="range" min="5" max="100" step="5" value=${speed.percent}
+      onInput=${({ target }) => speed.set(target.value)} onPointerUp=${letGo} />
+    <output for="speed">${speed.percent} %</output>${children}</div>`;
 }
 
 /** A line that says what is needed before the robot can be moved; its panel is marked as idle meanwhile. */

@@ -2,7 +2,7 @@
 import { Held, letGo, Needs, SpeedRow } from "./handling.js";
 import { POSE } from "./jogging.js";
 import { Pad } from "./pad.js";
-import { figure, html, Icon, isTyping, useComputed, useEvery, useOn, useRef, useState } from "./ui.js";
+import { barred, Choice, figure, html, Icon, isTyping, useComputed, useEvery, useOn, useRef, useState } from "./ui.js";
 
 /** Keys of the joints, up and down, the seventh to the twelfth in rows of their own; and of the tool. */
 const UP = ["KeyQ", "KeyW", "KeyE", "KeyR", "KeyT", "KeyY", "Digit1", "Digit2", "Digit3", "Digit4", "Digit5", "Digit6"];
@@ -17,7 +17,12 @@ export const KEYS = new Map([
   ...UP.map((code, k) => [code, ["joint", k, 1]]), ...DOWN.map((code, k) => [code, ["joint", k, -1]]),
   ...Object.entries(TOOL).map(([code, [axis, sign]]) => [code, ["tool", axis, sign]]),
 ]);
-const STEPS = [0, 0.1, 1, 5, 10];
+const STEPS = [[0, "hold"], ...[0.1, 1, 5, 10].map((step) => [step, `${step}° / mm`])];
+const FRAMES = [["base", "base frame"], ["tool", "tool frame"]];
+const MOTIONS = [["line", "in a line"], ["joint", "by joints"]];
+const BEGINS = [["now", "now"], ["append", "after the plan"], ["later", "in …"]];
+/** A bar is drawn anew for so small a part of its length: each time takes a moment of a page without a graphics card. */
+const GRAINS = 200;
 /** Time between two looks at the joints [ms]. */
 const LOOK = 100;
 const TURN = "as VAL-II's WHERE has it, in the base frame: R = Rz(O − 90°) Ry(A + 90°) Rz(T)";
@@ -60,9 +65,8 @@ export function Panel({ station }) {
   return html`
     <${Needs} station=${station} id="jog-needs" />
     <${SpeedRow} speed=${jog.speed}>
-      <select id="jog-step" aria-label="A press is" title="What a press of a button or key does" value=${jog.step}
-        onChange=${({ target }) => (jog.step = Number(target.value))}>
-        ${STEPS.map((step) => html`<option value=${step}>${step ? `${step}° / mm` : "hold"}</option>`)}</select><//>
+      <${Choice} id="jog-step" label="A press is" title="What a press of a button or key does" options=${STEPS} value=${jog.step}
+        choose=${(step) => (jog.step = Number(step))} /><//>
     <${Joints} station=${station} dof=${dof} go=${goTyped} />
     <${Tool} station=${station} go=${goTyped} />
     <${Poses} station=${station} />`;
@@ -77,13 +81,12 @@ function Jog({ station, what, label, children }) {
 
 /** Goes to what is typed. */
 function Go({ station, kind, go, children }) {
-  const why = station.idle;
-  return html`<button class="small go" type="button" id=${`go-${kind}`} aria-disabled=${why ? "true" : undefined}
-    title=${why || "Go to what is typed"} onClick=${go}>${children}</button>`;
+  return html`<button class="small go" type="button" id=${`go-${kind}`} ...${barred(station.idle, "Go to what is typed")}
+    onClick=${go}>${children}</button>`;
 }
 
 /** A number as it is, which may be typed: Enter goes there, Escape takes it back. */
-function Field({ jog, kind, k, field: { name, sign, low, high }, label, title, go }) {
+function Field({ jog, kind, k, field: { name, sign }, label, title, go }) {
   const shown = useComputed(() => (jog.q ? figure(jog.values(kind, jog.q)[k], 1) : "–"));
   const typed = jog.typed[name];
 
@@ -93,8 +96,8 @@ function Field({ jog, kind, k, field: { name, sign, low, high }, label, title, g
   }
 
   return html`<label class="field" data-typed=${typed === undefined ? undefined : ""} title=${title}>
-    <input id=${`jog-${name}`} inputmode="decimal" autocomplete="off" aria-label=${`${label} in ${sign === "°" ? "degrees" : sign}`}
-      aria-invalid=${jog.wrong === name ? "true" : undefined} value=${typed ?? shown.value} data-low=${low} data-high=${high}
+    <input id=${`jog-${name}`} inputmode="decimal" autocomplete="off" value=${typed ?? shown.value}
+      aria-label=${`${label} in ${sign === "°" ? "degrees" : sign}`} aria-invalid=${jog.wrong === name ? "true" : undefined}
       onFocus=${({ target }) => target.select()} onInput=${({ target }) => jog.type(name, target.value)} onKeyDown=${key} />
     <span aria-hidden="true">${sign}</span></label>`;
 }
@@ -122,7 +125,8 @@ function Joints({ station, dof, go }) {
 function Slider({ station, k, field: { name, low, high }, go }) {
   const { jog } = station;
   const typed = Number(jog.typed[name] ?? NaN);
-  const shown = useComputed(() => (jog.q ? jog.values("joints", jog.q)[k].toFixed(1) : low));
+  const grain = (high - low) / GRAINS;
+  const shown = useComputed(() => (jog.q ? Math.round(jog.values("joints", jog.q)[k] / grain) * grain : low));
   const why = station.idle;
 
   function drop() {
@@ -131,9 +135,9 @@ function Slider({ station, k, field: { name, low, high }, go }) {
   }
 
   return html`<input class="slide" type="range" min=${low} max=${high} step="any" aria-label=${`Joint ${k + 1}, drawn`}
-    aria-disabled=${why ? "true" : undefined} title=${why || "Draw it to another value: the joint moves when you let go"}
-    value=${Number.isFinite(typed) ? typed : shown.value} onInput=${({ target }) => jog.type(name, Number(target.value).toFixed(1))}
-    onChange=${drop} onPointerUp=${letGo} />`;
+    ...${barred(why, "Draw it to another value: the joint moves when you let go")}
+    value=${Number.isFinite(typed) ? typed : shown.value} onChange=${drop} onPointerUp=${letGo}
+    onInput=${({ target }) => jog.type(name, Number(target.value).toFixed(1))} />`;
 }
 
 function Tool({ station, go }) {
@@ -150,17 +154,17 @@ function Tool({ station, go }) {
     title=${k < 3 ? "Of the tool's point in the base frame" : `Turn of the tool, ${TURN}`} />`;
   return html`<section>
     <div class="head"><h2>Tool</h2>
-      <select id="jog-frame" aria-label="Frame of the tool's axes" value=${jog.frame} onChange=${({ target }) => (jog.frame = target.value)}>
-        <option value="base">base frame</option><option value="tool">tool frame</option></select>
+      <${Choice} id="jog-frame" label="Frame of the tool's axes" options=${FRAMES} value=${jog.frame}
+        choose=${(to) => (jog.frame = to)} />
       <span class="grow"></span>
-      <select id="pose-motion" aria-label="How the tool goes to what is typed" value=${motion}
-        onChange=${({ target }) => setMotion(target.value)}>
-        <option value="line">in a line</option><option value="joint">by joints</option></select>
+      <${Choice} id="pose-motion" label="How the tool goes to what is typed" options=${MOTIONS} value=${motion}
+        choose=${setMotion} />
       <${Go} station=${station} kind="pose" go=${goes}>Go<//></div>
     <div class="axes" role="group" aria-label="Tool">
       ${[0, 1, 2].map((k) => html`<div class="axis">
         <span>${POSE[k]}</span>${button(k, -1, "−")}${field(k)}${button(k, 1, "+")}
-        <span>${AXES[k + 3]}</span>${button(k + 3, -1, "−")}${button(k + 3, 1, "+")}<span>${POSE[k + 3]}</span>${field(k + 3)}</div>`)}
+        <span>${AXES[k + 3]}</span>${button(k + 3, -1, "−")}${button(k + 3, 1, "+")}
+        <span>${POSE[k + 3]}</span>${field(k + 3)}</div>`)}
     </div></section>`;
 }
 
@@ -168,7 +172,7 @@ function Poses({ station }) {
   const { jog, session } = station;
   const name = useRef(null);
   const why = station.idle;
-  const pose = ([title, q]) => html`<button type="button" data-pose=${title} aria-disabled=${why ? "true" : undefined} title=${why || undefined}
+  const pose = ([title, q]) => html`<button type="button" data-pose=${title} ...${barred(why)}
     onClick=${() => jog.go({ target: { type: "joints", q } }, title)}>${title}</button>`;
 
   function save(event) {
@@ -180,17 +184,17 @@ function Poses({ station }) {
 
   return html`<section>
     <div class="head"><h2>Go to</h2><span class="grow"></span><label for="when">Begin</label>
-      <select id="when" aria-label="When to begin" value=${jog.begin} onChange=${({ target }) => (jog.begin = target.value)}>
-        <option value="now">now</option><option value="append">after the plan</option><option value="later">in …</option></select>
+      <${Choice} id="when" label="When to begin" options=${BEGINS} value=${jog.begin} choose=${(to) => (jog.begin = to)} />
       <input id="later" type="number" min="0.5" max="600" step="0.5" value=${jog.later} hidden=${jog.begin !== "later"}
         aria-label="Seconds from now" onInput=${({ target }) => (jog.later = target.value)} /></div>
     <div class="goes"><div>
       <div class="poses" role="group" aria-label="Named poses">${Object.entries(session.welcome.poses).map(pose)}
         ${Object.entries(jog.saved).map(([title, q]) => html`<span class="saved">${pose([title, q])}
-          <button class="quiet" type="button" aria-label=${`Delete pose ${title}`} title="Delete it" onClick=${() => jog.remove(title)}>
-            <${Icon} name="delete" /></button></span>`)}</div>
+          <button class="quiet" type="button" aria-label=${`Delete pose ${title}`} title="Delete it"
+            onClick=${() => jog.remove(title)}><${Icon} name="delete" /></button></span>`)}</div>
       <form class="row" onSubmit=${save}><input id="pose-name" ref=${name} maxlength="40" size="10" autocomplete="off"
           aria-label="Name of a pose to save" placeholder="Name" title="Poses are kept in this browser" />
         <button id="pose-save" title="Save the joints that are shown, in this browser">Save</button></form></div>
-      <div class="pad-row"><${Pad} station=${station} twist=${(parts) => jog.twist(parts)} why=${station.steer.idle} /></div></div></section>`;
+      <div class="pad-row"><${Pad} station=${station} twist=${(parts) => jog.twist(parts)} why=${station.steer.idle} /></div>
+    </div></section>`;
 }

@@ -8,6 +8,7 @@ const POSES = "vrs-poses";
 /** What one may ask for of x, y, z [mm] and of the angles O, A, T [deg], either way. */
 const [FARTHEST, FULL_TURN] = [100000, 360];
 const LONGEST_NAME = 24;
+const INSERTIONS = { now: "replace", append: "append" };
 /** Names of a pose's numbers: where the tool's point is in the base frame, and how it's turned. */
 export const POSE = ["x", "y", "z", "O", "A", "T"];
 
@@ -81,12 +82,15 @@ export class Jogging {
   stepTool([, which, sign]) {
     const { chain } = this.station;
     const { X } = this.from();
-    const place = chain.toolOf(X);
-    const amount = (sign * this.step) / (which < 3 ? 1000 : 180 / Math.PI);
-    const axis = this.frame === "base" ? [0, 1, 2].map((row) => (row === which % 3 ? 1 : 0)) : X.slice(4 * (which % 3), 4 * (which % 3) + 3);
-    const turn = which < 3 ? X : multiply(exponential([...axis, 0, 0, 0], amount), [...X.slice(0, 12), 0, 0, 0, 1]);
-    const next = chain.linkAt(which < 3 ? place.map((x, k) => x + amount * axis[k]) : place, turn);
-    this.last = { X: next, entry: this.order(this.posed(next, "line"), `tool ${POSE[which % 3]} ${sign < 0 ? "−" : "+"}${this.step}`) };
+    const along = which < 3;
+    const column = which % 3;
+    const axis = this.frame === "tool" ? X.slice(4 * column, 4 * column + 3) : [0, 1, 2].map((row) => (row === column ? 1 : 0));
+    const amount = (sign * this.step) / (along ? 1000 : 180 / Math.PI);
+    const place = chain.toolOf(X).map((x, k) => (along ? x + amount * axis[k] : x));
+    const turn = along ? X : multiply(exponential([...axis, 0, 0, 0], amount), [...X.slice(0, 12), 0, 0, 0, 1]);
+    const next = chain.linkAt(place, turn);
+    const label = `tool ${along ? "" : "about "}${POSE[column]} ${sign < 0 ? "−" : "+"}${this.step}`;
+    this.last = { X: next, entry: this.order(this.posed(next, "line"), label) };
   }
 
   /** Where the next step begins: where the last one leads as long as that's on its way, else where the robot is. */
@@ -115,7 +119,7 @@ export class Jogging {
   /** Move when it's to begin. */
   go(parts, label) {
     const { begin, session } = this;
-    const when = begin === "later" ? { execute_at: session.now + this.delay } : { insertion: begin === "now" ? "replace" : "append" };
+    const when = begin === "later" ? { execute_at: session.now + this.delay } : { insertion: INSERTIONS[begin] };
     return this.order({ ...parts, ...when }, label);
   }
 
@@ -174,7 +178,8 @@ export class Jogging {
     this.wrong = "";
     const values = this.read(kind);
     if (values === null) return null;
-    if (kind === "joints") return this.go({ target: { type: "joints", q: values.map((x, k) => x / this.unit(k).scale) } }, "joints");
+    const q = values.map((x, k) => x / this.unit(k).scale);
+    if (kind === "joints") return this.go({ target: { type: "joints", q } }, "joints");
     const X = this.station.chain.linkAt(values.slice(0, 3).map((x) => x / 1000), turned(values.slice(3)));
     return this.go(this.posed(X, motion), "a pose");
   }

@@ -25,6 +25,22 @@ export class Editor {
     this.history = JSON.parse(localStorage.getItem(KEY) ?? "[]");
     this.back = 0;
     this.draft = "";
+    this.keys = this.bound();
+  }
+
+  /** What keys do, by what a terminal sends for them: each key, and its letter with Ctrl. */
+  bound() {
+    const does = [
+      ["\x7f \b", () => this.cut(this.at - 1, this.at)], ["\x1b[3~ \x04", () => this.cut(this.at, this.at + 1)],
+      ["\x1b[D \x1bOD \x02", () => this.go(this.at - 1)], ["\x1b[C \x1bOC \x06", () => this.go(this.at + 1)],
+      ["\x1b[H \x1bOH \x01", () => this.go(0)], ["\x1b[F \x1bOF \x05", () => this.go(Infinity)],
+      ["\x1b[A \x1bOA \x10", () => this.recall(1)], ["\x1b[B \x1bOB \x0e", () => this.recall(-1)],
+      ["\x15", () => this.cut(0, this.at)], ["\x0b", () => this.cut(this.at, Infinity)],
+      ["\x17", () => this.cut(this.at - (this.text.slice(0, this.at).match(WORD)?.[0].length ?? 0), this.at)],
+      ["\x03", () => this.interrupt()], ["\x0c", () => this.wipe()],
+      ["\t", () => this.text && this.does.complete(this.text.slice(0, this.at))],
+    ];
+    return Object.fromEntries(does.flatMap(([keys, action]) => keys.split(" ").map((key) => [key, action])));
   }
 
   /** Take what the terminal sends for keys, or a text that's pasted. */
@@ -40,20 +56,7 @@ export class Editor {
   }
 
   press(piece) {
-    const does = {
-      "\x7f": () => this.cut(this.at - 1, this.at), "\b": () => this.cut(this.at - 1, this.at),
-      "\x1b[3~": () => this.cut(this.at, this.at + 1), "\x04": () => this.cut(this.at, this.at + 1),
-      "\x1b[D": () => this.go(this.at - 1), "\x02": () => this.go(this.at - 1), "\x1bOD": () => this.go(this.at - 1),
-      "\x1b[C": () => this.go(this.at + 1), "\x06": () => this.go(this.at + 1), "\x1bOC": () => this.go(this.at + 1),
-      "\x1b[H": () => this.go(0), "\x1bOH": () => this.go(0), "\x01": () => this.go(0),
-      "\x1b[F": () => this.go(Infinity), "\x1bOF": () => this.go(Infinity), "\x05": () => this.go(Infinity),
-      "\x1b[A": () => this.recall(1), "\x1bOA": () => this.recall(1), "\x10": () => this.recall(1),
-      "\x1b[B": () => this.recall(-1), "\x1bOB": () => this.recall(-1), "\x0e": () => this.recall(-1),
-      "\x15": () => this.cut(0, this.at), "\x0b": () => this.cut(this.at, Infinity),
-      "\x17": () => this.cut(this.at - (this.text.slice(0, this.at).match(WORD)?.[0].length ?? 0), this.at),
-      "\x03": () => this.interrupt(), "\x0c": () => this.wipe(),
-      "\t": () => this.text && this.does.complete(this.text.slice(0, this.at)),
-    }[piece];
+    const does = this.keys[piece];
     if (does) does();
     else if (piece >= " ") this.insert(piece);
   }
@@ -84,12 +87,8 @@ export class Editor {
 
   /** The line is complete: it's left standing, and remembered. */
   end() {
-    const line = this.text;
-    this.at = line.length;
-    this.draw();
-    this.term.write("\r\n");
-    this.text = this.partial = this.prompt = "";
-    this.at = this.row = this.back = 0;
+    const line = this.leave("");
+    this.prompt = "";
     if (line.trim() && line !== this.history.at(-1)) {
       this.history = [...this.history, line].slice(-KEPT);
       localStorage.setItem(KEY, JSON.stringify(this.history));
@@ -104,13 +103,19 @@ export class Editor {
   }
 
   interrupt() {
-    const typed = this.text;
-    this.at = typed.length;
+    this.leave("^C");
+    this.does.interrupt();
+  }
+
+  /** Leave what is typed standing, with a mark behind it, and begin a line below; what was typed. */
+  leave(mark) {
+    const line = this.text;
+    this.at = line.length;
     this.draw();
-    this.term.write("^C\r\n");
+    this.term.write(mark + "\r\n");
     this.text = this.partial = "";
     this.at = this.row = this.back = 0;
-    this.does.interrupt();
+    return line;
   }
 
   wipe() {

@@ -20,7 +20,8 @@ export function Panel({ station }) {
   });
   const [tone, symbol, word] = LINKS[link];
   return html`
-    <${Pill} id="link-pill" title="Connection of this page to the server" tone=${tone} icon=${symbol} data-state=${link}>${word}<//>
+    <${Pill} id="link-pill" title="Connection of this page to the server" tone=${tone} icon=${symbol} data-state=${link}>
+      ${word}<//>
     <${RealRobot} station=${station} />
     <${Door} station=${station} />`;
 }
@@ -44,9 +45,10 @@ function RealRobot({ station }) {
     : busy(session) ? ["good", "route", "Drives by itself"]
     : ["good", body, "Real robot follows"];
   return html`
-    <${Pill} id="robot-pill" title=${why || "The real robot, as the server last heard of it"} tone=${tone} icon=${symbol}>${words}<//>
-    <button class="small" type="button" id="resume" ref=${resume} hidden=${!(why && holds)} onClick=${() => session.wish("resume")}>
-      Resume</button>`;
+    <${Pill} id="robot-pill" title=${why || "The real robot, as the server last heard of it"} tone=${tone} icon=${symbol}>
+      ${words}<//>
+    <button class="small" type="button" id="resume" ref=${resume} hidden=${!(why && holds)}
+      onClick=${() => session.wish("resume")}>Resume</button>`;
 }
 
 /** Asks for a token, or a class's code and a name, where the server lets nobody in without one. */
@@ -57,10 +59,12 @@ function Door({ station }) {
   const teaches = station.config.panels.some((panel) => panel.name === "class");
   const code = new URLSearchParams(location.search).get("code");
   useEffect(() => {
-    if (!locked) return;
-    sessionStorage.removeItem("token");
-    if (code && !session.token) input.current.value = code;
-    dialog.current.showModal();
+    if (!locked) dialog.current.close();
+    else {
+      sessionStorage.removeItem("token");
+      if (code && !session.token) input.current.value = code;
+      dialog.current.showModal();
+    }
   }, [locked]);
 
   function enter() {

@@ -1,5 +1,5 @@
 // The way to the robot: what is emulated on it, changed by who has control, and what is measured of it.
-import { figure, h, mark, write } from "./dom.js";
+import { figure, html, useEffect, useEvery, useOn, useRef, useState, untracked } from "./ui.js";
 
 const DELAYS = ["none", "constant:0.1", "constant:0.3", "domain", "country", "mon", "tue", "wed", "thu", "fri", "lunar"];
 const LOSSES = ["0", "0.01", "0.05", "0.2", "burst:0.05,5"];
@@ -11,184 +11,155 @@ const ASK = 1;
 const ENOUGH = 100;
 const WAYS = ["forward", "backward"];
 const NAMES = { forward: "to the robot", backward: "back" };
+/** What is measured of the robot's site: name, label, what that means, and its text. */
+const FACTS = [
+  ["trip", "Round trip", "Between the two sites, with the network beneath: median, and what 95 % keep within",
+    ({ round_trip: { median, p95 } }) => (median == null ? "–" : `${time(median)}, 95 % in ${time(p95)}`)],
+  ["clock", "Clocks", "By how much the robot may err about the session's time, and this page", ({ clock }, { sync }) => {
+    const mine = sync.uncertainty(performance.now() / 1000);
+    return `robot ± ${time(clock)}, page ± ${time(Number.isFinite(mine) ? mine : null)}`;
+  }],
+  ["offset", "Robot plays", "D: the robot's timeline less the session's time", ({ link_loss: loss, offset }, { state }) => {
+    const behind = state?.D == null ? "" : `, ${time(Math.max(0, -state.D))} behind`;
+    return !loss ? "–" : (offset == null ? "adaptive" : `fixed, D = ${figure(offset, 2)} s`) + behind;
+  }],
+  ["policy", "Silence", "What the robot does when nothing is heard", policy],
+  ["age", "Newest state", "Age of what is known of the real robot",
+    (_, { state, now }) => (state?.t == null || now === null ? "–" : time(Math.max(0, now - state.t)))],
+  ["robot", "Robot at", "Where the robot's site listens",
+    ({ robot, problem }) => (problem ? `${robot || "not known yet"}: ${problem}` : robot.replace(/^wss?:\/\//, ""))],
+  ["seed", "Seed", "Of what is random in the emulation", ({ seed }) => seed],
+];
 
-export function mount(station, box) {
-  const { session } = station;
-  const fields = { forward: {}, backward: {} };
-  const same = h("input", { id: "net-same", type: "checkbox" });
-  const apply = h("button.main", { id: "net-apply" }, "Apply");
-  const reset = h("button", { type: "button", id: "net-reset" }, "Discard");
-  const needs = h("p.needs", { id: "net-needs" });
-  const fault = h("p.refused", { id: "net-fault" });
-  const advice = h("p.advice", { id: "net-advice", role: "status" });
-  const by = h("p.muted", { id: "net-by" });
-  /** Whether something was written that isn't applied. */
-  let edited = false;
-  /** Number of the request that waits for its answer. */
-  let asked = null;
-  let surveyed = -Infinity;
+/** Conditions, with what a message leaves out where it's usual. */
+const whole = ({ delay, loss = "0", service = "datagram" }) => ({ delay, loss, service });
 
-  const table = h("div.ways", {}, h("span"), h("span.head", {}, NAMES.forward), h("span.head", {}, NAMES.backward));
-  const row = (label, make) => table.append(h("span", {}, label), ...WAYS.map(make));
-  const put = (way, name, element) => (fields[way][name] = element);
-  const written = (way, name, list) => put(way, name, h("input", { id: `net-${name}-${way}`, list, maxlength: 200,
-    autocomplete: "off", spellcheck: "false", "aria-label": `${name} ${NAMES[way]}`, "aria-describedby": "net-fault" }));
-  row("Delay", (way) => written(way, "delay", "net-delays"));
-  row("Loss", (way) => written(way, "loss", "net-losses"));
-  row("Delivery", (way) => put(way, "service", h("select", { id: `net-service-${way}`,
-    "aria-label": `Delivery ${NAMES[way]}` }, ...SERVICES.map(([value, text]) => h("option", { value }, text)))));
-  const set = h("fieldset", { "aria-label": "Emulated way" }, table,
-    h("div.row", {}, h("label.row", {}, same, "the same both ways"), h("span.grow"), reset, apply));
-  const form = h("form", { id: "net-form" }, set, fault);
+export function Panel({ station }) {
+  return html`<${Way} station=${station} /><${Figures} session=${station.session} />`;
+}
 
-  const cells = {};
-  const cell = (name) => (cells[name] = h("td", { id: "net-" + name }, "–"));
-  const measured = h("table.measured", {},
-    h("thead", {}, h("tr", {}, h("td"), ...WAYS.map((way) =>
-      h("th", { scope: "col" }, NAMES[way], cells["span-" + way] = h("span.span", { id: "net-span-" + way }))))),
-    h("tbody", {}, ...[["median", "Delay, median"], ["p95", "Delay, 95 %"], ["lost", "Lost"]].map(([name, label]) =>
-      h("tr", {}, h("th", { scope: "row" }, label), ...WAYS.map((way) => cell(name + "-" + way))))));
-  const facts = h("dl.facts");
-  const fact = (name, label, title) => {
-    cells[name] = h("dd", { id: "net-" + name }, "–");
-    facts.append(h("dt", { title }, label), cells[name]);
-  };
-  fact("trip", "Round trip", "Between the two sites, with the network beneath: median, and what 95 % keep within");
-  fact("clock", "Clocks", "By how much the robot may err about the session's time, and this page");
-  fact("offset", "Robot plays", "D: the robot's timeline less the session's time");
-  fact("policy", "Silence", "What the robot does when nothing is heard");
-  fact("age", "Newest state", "Age of what is known of the real robot");
-  fact("robot", "Robot at", "Where the robot's site listens");
-  fact("seed", "Seed", "Of what is random in the emulation");
-  const lists = [["net-delays", DELAYS], ["net-losses", LOSSES]].map(([id, values]) =>
-    h("datalist", { id }, ...values.map((value) => h("option", { value }))));
-  box.append(...lists, needs, form, advice, by, measured, facts);
-
-  /** The way as it's written. */
-  function wanted(way) {
-    return Object.fromEntries(Object.entries(fields[way]).map(([name, field]) => [name, field.value.trim()]));
-  }
-
-  /** Conditions as a message leaves them out where they're usual. */
-  function whole({ delay, loss = "0", service = "datagram" }) {
-    return { delay, loss, service };
-  }
-
-  function mirror() {
-    for (const [name, field] of Object.entries(fields.backward)) {
-      field.disabled = same.checked;
-      if (same.checked) field.value = fields.forward[name].value;
-    }
-  }
-
-  /** Write what is in force into the fields. */
-  function fill() {
-    const { network } = session;
-    if (!network) return;
-    edited = false;
-    for (const way of WAYS) {
-      for (const [name, value] of Object.entries(whole(network[way]))) fields[way][name].value = value;
-    }
-    same.checked = JSON.stringify(wanted("forward")) === JSON.stringify(wanted("backward"));
-    mirror();
-    complain("");
-  }
-
-  function complain(text, about = "") {
-    write(fault, text);
-    for (const way of WAYS) {
-      for (const [name, field] of Object.entries(fields[way])) mark(field, "aria-invalid", name === about ? "true" : null);
-    }
-  }
-
-  form.addEventListener("input", () => {
-    edited = true;
-    mirror();
-    show();
-  });
-  reset.addEventListener("click", () => {
-    fill();
-    show();
-  });
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    complain("");
-    asked = session.wish("impair", { forward: wanted("forward"), backward: wanted("backward") });
-    if (!asked) complain("There's no connection: nothing was asked.");
-  });
-
-  function answered(network) {
-    if (network.answers === asked && asked) {
-      asked = null;
-      fill();
-      station.announce("The way to the robot is changed");
-    } else if (!edited) fill();
-    show();
-  }
-
-  station.on("network", answered);
-  station.on("problem", ({ number, text, field }) => {
-    if (!asked || number !== asked) return;
-    asked = null;
-    complain(text, field);
-  });
-  station.on("welcome", () => {
-    asked = null;
-    ask();
-    show();
-  });
-  for (const type of ["lease", "link"]) station.on(type, show);
+/** What is measured, and how the robot's site is: looked at anew every half second. */
+function Figures({ session }) {
+  const { network, welcome, link } = session;
+  const box = useRef(null);
+  const surveyed = useRef(-Infinity);
+  const [, drawAnew] = useState(0);
 
   function ask() {
-    if (session.wish("survey")) surveyed = performance.now() / 1000;
+    if (session.wish("survey")) surveyed.current = performance.now() / 1000;
   }
 
-  function show() {
-    const may = session.holds && session.link === "live" && Boolean(session.network);
-    set.disabled = !may;
-    reset.disabled = apply.disabled = !edited;
-    const { lease, link } = session;
-    const who = lease.state === "held" ? `${lease.holder} has control, and may change it.` : "Take control to change it.";
-    write(needs, may ? "" : link !== "live" ? "No connection: what is shown is old." : session.mayCommand ? who : "You are here to watch.");
-    needs.hidden = may;
-    tell();
+  useEffect(() => {
+    if (welcome) ask();
+  }, [welcome]);
+  useEvery(LOOK, () => {
+    if (document.hidden || box.current.offsetParent === null || session.link !== "live") return;
+    if (performance.now() / 1000 - surveyed.current > ASK) ask();
+    drawAnew((count) => count + 1);
+  });
+  const since = network?.changed_at == null || session.now === null ? null : session.now - network.changed_at;
+  const changed = since === null ? "" : `Changed by ${network.changed_by} ${Math.max(0, Math.round(since))} s ago`;
+  const advice = network?.advice;
+  const fact = (text) => (network ? untracked(() => text(network, session)) : "–");
+  return html`<div class="figures" ref=${box} data-old=${link === "live" ? undefined : ""}>
+    <p class="advice" id="net-advice" role="status">${advice && advice[0].toUpperCase() + advice.slice(1)}</p>
+    <p class="muted" id="net-by">${changed}</p>
+    <${Measured} network=${network} />
+    <dl class="facts">${FACTS.map(([name, label, title, text]) => html`
+      <dt title=${title}>${label}</dt><dd id=${`net-${name}`}>${fact(text)}</dd>`)}</dl></div>`;
+}
+
+/** What is emulated, to be changed by who has control. */
+function Way({ station }) {
+  const { session } = station;
+  const { network, link, holds, lease, mayCommand, welcome } = session;
+  const [edited, setEdited] = useState(null);
+  const [same, setSame] = useState(null);
+  const [fault, setFault] = useState({ text: "" });
+  /** Number of the request that waits for its answer. */
+  const asked = useRef(null);
+  const inForce = network && { forward: whole(network.forward), backward: whole(network.backward) };
+  const shown = edited ?? inForce ?? { forward: {}, backward: {} };
+  const alike = same ?? JSON.stringify(shown.forward) === JSON.stringify(shown.backward);
+  const may = holds && link === "live" && Boolean(network);
+
+  function discard() {
+    setEdited(null);
+    setSame(null);
+    setFault({ text: "" });
   }
 
-  /** What is measured, and how the robot's site is. */
-  function tell() {
-    const { network, state } = session;
-    if (!network) return;
-    const old = session.link !== "live";
-    mark(box, "data-old", old ? "" : null);
-    for (const [way, found] of [["forward", network.there], ["backward", network.back]]) {
-      for (const name of ["median", "p95"]) write(cells[`${name}-${way}`], time(found[name]));
-      write(cells["lost-" + way], losses(found));
-      write(cells["span-" + way], found.span == null ? "" : `in the last ${Math.max(1, Math.round(found.span))} s`);
-    }
-    const trip = network.round_trip;
-    write(cells.trip, trip.median == null ? "–" : `${time(trip.median)}, 95 % in ${time(trip.p95)}`);
-    const mine = session.sync.uncertainty(performance.now() / 1000);
-    write(cells.clock, `robot ± ${time(network.clock)}, page ± ${time(Number.isFinite(mine) ? mine : null)}`);
-    const behind = state?.D == null ? "" : `, ${time(Math.max(0, -state.D))} behind`;
-    write(cells.offset, !network.link_loss ? "–" : (network.offset == null ? "adaptive" : `fixed, D = ${figure(network.offset, 2)} s`) + behind);
-    write(cells.policy, policy(network));
-    const age = state?.t != null && session.now !== null ? session.now - state.t : null;
-    write(cells.age, age === null ? "–" : time(Math.max(0, age)));
-    write(cells.robot, network.problem ? `${network.robot || "not known yet"}: ${network.problem}` : network.robot.replace(/^wss?:\/\//, ""));
-    write(cells.seed, String(network.seed));
-    write(advice, network.advice ? network.advice[0].toUpperCase() + network.advice.slice(1) : "");
-    const when = network.changed_at == null || session.now === null ? null : session.now - network.changed_at;
-    write(by, when === null ? "" : `Changed by ${network.changed_by} ${Math.max(0, Math.round(when))} s ago`);
+  function change(way, name, value) {
+    const next = { ...shown, [way]: { ...shown[way], [name]: value } };
+    setEdited(alike ? { forward: next.forward, backward: next.forward } : next);
+    setSame(alike);
   }
 
-  setInterval(() => {
-    if (document.hidden || box.offsetParent === null || session.link !== "live") return;
-    if (performance.now() / 1000 - surveyed > ASK) ask();
-    tell();
-  }, LOOK);
-  if (session.welcome) ask();
-  mirror();
-  show();
+  function mirror(alike) {
+    setSame(alike);
+    setEdited(alike ? { forward: shown.forward, backward: shown.forward } : { ...shown });
+  }
+
+  function apply(event) {
+    event.preventDefault();
+    const trimmed = (fields) => Object.fromEntries(Object.entries(fields).map(([name, value]) => [name, value.trim()]));
+    asked.current = session.wish("impair", { forward: trimmed(shown.forward), backward: trimmed(shown.backward) });
+    setFault({ text: asked.current ? "" : "There's no connection: nothing was asked." });
+  }
+
+  useOn(session, "network", ({ answers }) => {
+    if (!asked.current || answers !== asked.current) return;
+    asked.current = null;
+    discard();
+    station.announce("The way to the robot is changed");
+  });
+  useOn(session, "problem", ({ number, text, field }) => {
+    if (!asked.current || number !== asked.current) return;
+    asked.current = null;
+    setFault({ text, field });
+  });
+  useEffect(() => {
+    asked.current = null;
+  }, [welcome]);
+
+  const who = lease.state === "held" ? `${lease.holder} has control, and may change it.` : "Take control to change it.";
+  const why = may ? "" : link !== "live" ? "No connection: what is shown is old." : mayCommand ? who : "You are here to watch.";
+  const unchanged = may && !edited ? "Nothing is changed yet" : undefined;
+  const given = (way, name) => ({ id: `net-${name}-${way}`, value: shown[way][name] ?? "", disabled: alike && way === "backward",
+    onInput: ({ target }) => change(way, name, target.value), "aria-label": `${name} ${NAMES[way]}` });
+  const written = (name, list) => WAYS.map((way) => html`<input ...${given(way, name)} list=${list} maxlength="200"
+    autocomplete="off" spellcheck="false" aria-describedby="net-fault"
+    aria-invalid=${fault.field === name ? "true" : undefined} />`);
+  return html`
+    <datalist id="net-delays">${DELAYS.map((value) => html`<option value=${value} />`)}</datalist>
+    <datalist id="net-losses">${LOSSES.map((value) => html`<option value=${value} />`)}</datalist>
+    <p class="needs" id="net-needs" hidden=${may}>${why}</p>
+    <form id="net-form" onSubmit=${apply}>
+      <fieldset aria-label="Emulated way" disabled=${!may} title=${why || undefined}>
+        <div class="ways"><span></span>${WAYS.map((way) => html`<span class="head">${NAMES[way]}</span>`)}
+          <span>Delay</span>${written("delay", "net-delays")}
+          <span>Loss</span>${written("loss", "net-losses")}
+          <span>Delivery</span>${WAYS.map((way) => html`<select ...${given(way, "service")}>
+            ${SERVICES.map(([value, text]) => html`<option value=${value}>${text}</option>`)}</select>`)}</div>
+        <div class="row"><label class="row"><input id="net-same" type="checkbox" checked=${alike}
+          onInput=${({ target }) => mirror(target.checked)} />the same both ways</label><span class="grow"></span>
+          <button type="button" id="net-reset" disabled=${!edited} title=${unchanged} onClick=${discard}>Discard</button>
+          <button class="main" id="net-apply" disabled=${!edited} title=${unchanged}>Apply</button></div>
+      </fieldset>
+      <p class="refused" id="net-fault">${fault.text}</p>
+    </form>`;
+}
+
+function Measured({ network }) {
+  const found = { forward: network?.there, backward: network?.back };
+  const row = (name, label, text) => html`<tr><th scope="row">${label}</th>${WAYS.map((way) => html`
+    <td id=${`net-${name}-${way}`}>${found[way] ? text(found[way]) : "–"}</td>`)}</tr>`;
+  const span = (one) => (one?.span == null ? "" : `in the last ${Math.max(1, Math.round(one.span))} s`);
+  return html`<table class="measured">
+    <thead><tr><td></td>${WAYS.map((way) => html`<th scope="col">${NAMES[way]}
+      <span class="span" id=${`net-span-${way}`}>${span(found[way])}</span></th>`)}</tr></thead>
+    <tbody>${row("median", "Delay, median", ({ median }) => time(median))}${row("p95", "Delay, 95 %", ({ p95 }) => time(p95))}
+      ${row("lost", "Lost", losses)}</tbody></table>`;
 }
 
 function policy({ link_loss: loss, timeout, max_age: age }) {

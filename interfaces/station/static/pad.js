@@ -84,7 +84,7 @@ export function Pad({ station, twist, words = TOOL, why = "" }) {
       steer.release("pad");
     }
   });
-  return html`<div class="stick" role="img" ref=${stick} aria-label=${words.stick} title=${why || words.stick} data-off=${why ? "" : undefined}
-      onPointerDown=${grab} onPointerMove=${follow} onLostPointerCapture=${drop}><i class="knob" ref=${knob}></i></div>
+  return html`<div class="stick" role="img" ref=${stick} aria-label=${words.stick} title=${why || words.stick}
+      data-off=${why ? "" : undefined} onPointerDown=${grab} onPointerMove=${follow} onLostPointerCapture=${drop}><i class="knob" ref=${knob}></i></div>
     <p class="hint gamepad" hidden=${!found}>${found ? words.gamepad : ""}</p>`;
 }

@@ -92,7 +92,8 @@ export function Panel({ station: { stop } }) {
 
   useOn(window, "keydown", key, { capture: true });
   useOn(window, "keyup", key, { capture: true });
-  // STOP is there where it works: nobody should rely on one that doesn't. A click without a pointer is the Enter key's or a screen reader's.
+  // STOP is there where it works: nobody should rely on one that doesn't.
+  // A click without a pointer is the Enter key's, or a screen reader's.
   return html`<span class="stop-note" id="stop-note">${stop.note}</span>
     <button class="stop" type="button" id="stop" aria-describedby="stop-note" title="Stop the robot (space bar)"
       hidden=${stop.another !== null} data-waits=${stop.waits ? "" : undefined} onPointerDown=${point}

@@ -57,6 +57,15 @@ export function Dialog({ children, close, ...others }) {
   return html`<dialog ref=${dialog} onClose=${close} ...${others}>${children}</dialog>`;
 }
 
+/** One of several: pairs of a value and what people read. */
+export function Choice({ label, options, choose, ...others }) {
+  return html`<select aria-label=${label} onChange=${({ target }) => choose(target.value)} ...${others}>
+    ${options.map(([value, text]) => html`<option value=${value}>${text}</option>`)}</select>`;
+}
+
+/** Of a control: that it can't work now and why, "" where it can, and what else it's titled. */
+export const barred = (why, title) => ({ "aria-disabled": why ? "true" : undefined, title: why || title });
+
 /** Whether a key that is pressed belongs to what is written in. */
 export function isTyping(event) {
   const target = event.target;

@@ -66,3 +66,40 @@ def test_a_hint_stands_in_nobody_s_way(browser: Any, server: Child) -> None:
         assert not page.get(SHOWN)
         page.open()
         assert not page.get(SHOWN)
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390)])
+def test_on_a_phone_all_that_is_needed_is_in_sight(browser: Any, server: Child, width: int, height: int) -> None:
+    with paged(browser, station(server), hints=True, viewport={"width": width, "height": height}) as page:
+        page.open()
+        page.wait(SHOWN)
+        # Those of the page before may have control for a moment yet.
+        page.wait("!document.getElementById('take').hidden && !document.getElementById('stop').hidden")
+        page.wait("Boolean(document.getElementById('hint').style.left)")
+        page.page.wait_for_timeout(100)
+        hint, arrow, take, pane = (
+            page.page.locator(name).bounding_box() for name in ("#hint", "#hint .arrow", "#take", "#pane-box")
+        )
+        tip = arrow["x"] + arrow["width"] / 2
+        assert take["x"] < tip < take["x"] + take["width"], (arrow, take)
+        assert hint["y"] - take["y"] - take["height"] < 24
+        for name in ("#take", "#stop"):
+            box = page.page.locator(name).bounding_box()
+            assert 0 <= box["x"] <= width - box["width"]
+            middle = f"{box['x'] + box['width'] / 2}, {box['y'] + box['height'] / 2}"
+            assert page.get(f"document.elementFromPoint({middle}).closest('{name}') !== null"), name
+        assert pane["width"] * pane["height"] >= 0.5 * width * height
+        titles = []
+        for _ in range(3):
+            titles.append(page.page.locator("#hint-title").text_content())
+            box = page.page.locator("#hint").bounding_box()
+            assert 0 <= box["x"] <= width - box["width"]
+            assert 0 <= box["y"] <= height - box["height"]
+            page.page.click("#hint-next")
+        assert len(set(titles)) == 3
+        page.take_control()
+        for name in ("#give", "#stop"):
+            box = page.page.locator(name).bounding_box()
+            assert 0 <= box["x"] <= width - box["width"]
+        page.shoot(f"phone-{width}")
+        page.page.click("#give")

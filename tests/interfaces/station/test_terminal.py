@@ -19,7 +19,7 @@ from interfaces.val2.pages import LARGEST
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import PATIENCE, SERVE, Page, paged, station
 
-TEXT = "station.shared.terminal.text"
+TEXT = "station.terminal.text"
 PASTE = """(text) => { const data = new DataTransfer(); data.setData("text/plain", text);
     const given = { clipboardData: data, bubbles: true, cancelable: true };
     document.getElementById("terminal-input").dispatchEvent(new ClipboardEvent("paste", given)); }"""
@@ -49,7 +49,7 @@ def shows(page: Page, expression: str) -> None:
 def terminal(page: Page) -> Page:
     """Open the tab, and wait for the prompt."""
     page.page.click("#tab-terminal")
-    page.wait(f"station.shared.terminal !== undefined && {TEXT}.endsWith('\\n.')")
+    page.wait(f"station.terminal !== null && {TEXT}.endsWith('\\n.')")
     page.page.focus("#terminal-input")
     return page
 
@@ -127,11 +127,11 @@ def test_lines_are_edited_completed_and_recalled(browser: Any, server: Child) ->
         assert "[31mred" in said(page, 'do type $chr(27), "[31mred"', "red\n")
         long = "listr " + " + ".join(["1"] * 60)
         said(page, long, "\n60\n")
-        columns = page.get("station.shared.terminal.columns")
+        columns = page.get("station.terminal.columns")
         page.page.focus("#splitter")
         for _ in range(8):
             keys.press("ArrowLeft")
-        page.wait(f"station.shared.terminal.columns > {columns}")
+        page.wait(f"station.terminal.columns > {columns}")
         assert "*Too many" not in page.get(TEXT)
 
 
