@@ -159,7 +159,8 @@ function Tools({ strip }) {
   // It's drawn anew where it begins and ends, not for each time between.
   const past = useComputed(() => station.cursor !== null).value;
   const over = moves && chosen !== null && !(strip.move?.end > (session.now ?? 0));
-  const why = idle || (chosen === null ? "choose a move on the strip first" : over ? "this move is over" : "");
+  const none = strip.move ? "this move is over" : "the chosen move isn't in the plan any more";
+  const why = idle || (chosen === null ? "choose a move on the strip first" : over ? none : "");
   const poses = Object.keys(session.welcome?.poses ?? {});
   const tool = (id, icon, title, does, children, others) =>
     html`<${Tool} station=${station} id=${id} icon=${icon} title=${title} does=${does} ...${others}>${children}<//>`;
