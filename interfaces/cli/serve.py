@@ -308,11 +308,14 @@ class _Class:
 async def _show_codes(pages: JoinPages) -> None:
     """Print the codes of a class whenever there are new ones."""
     import asyncio
+    import contextlib
 
+    pictures = sys.stdout.isatty() and sys.stdout.encoding.lower() == "utf-8"
     while True:
-        text, left = pages.shown(pictures=sys.stdout.isatty())
-        # Nobody waits for a terminal that takes no lines.
-        await asyncio.to_thread(typer.echo, text, nl=False)
+        text, left = pages.shown(pictures=pictures)
+        with contextlib.suppress(OSError):
+            # Nobody waits for a terminal that takes no lines.
+            await asyncio.to_thread(typer.echo, text, nl=False)
         await asyncio.sleep(left)
 
 
@@ -389,7 +392,7 @@ async def _serve(
                 if one.val_port is not None:
                     val_room = room
             if not one.robot.is_base:
-                routes += Plans(one.robot.model, access, operator.clock).routes
+                routes += Plans(one.robot.arm, access, operator.clock).routes
             routes += _station(one, serving).routes
             if one.folder:
                 others.append(Mount(one.folder, routes=routes))

@@ -241,7 +241,7 @@ class Journal:
             VrsError: As `Engine.execute`.
         """
         self.look()
-        result = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
+        result = self.engine.undo() if command is None else self.engine.execute(command)
         # It's done: from here on nothing may raise.
         self._done = result if isinstance(result, Receipt) else None
         return self._done

@@ -180,7 +180,7 @@ class Rerun:
             return self._engines[-1].refuse(command, "" if entry.receipt is None else entry.receipt.reason)
         if command is None:
             return self._engines[-1].undo()
-        answer: object = self._engines[-1].execute(command)  # type: ignore[arg-type]
+        answer: object = self._engines[-1].execute(command)
         return answer if isinstance(answer, Receipt) else None
 
     def _compare(self, made: tuple[AnyEdit, ...], entry: Deed) -> None:

@@ -4,6 +4,7 @@
 const PERIOD = 40;
 /** By how much stamps lie behind this page's idea of the session's time, so that none comes before its time [s]. */
 const BEHIND = 0.004;
+const BLIND = "You look at another time: press Live to steer.";
 
 /** What the strip calls steering, by what is held; of the rest by what is asked for. */
 const BY = { drag: "tool dragged", stick: "tool by stick", pad: "tool by gamepad" };
@@ -39,8 +40,9 @@ export class Steer {
     return this.station.cursor !== null;
   }
 
-  get active() {
-    return this.inputs.size > 0;
+  /** Why nobody can steer now; "" where somebody can. */
+  get idle() {
+    return this.station.idle || (this.blind ? BLIND : "");
   }
 
   /**
@@ -58,7 +60,7 @@ export class Steer {
       return false;
     }
     if (this.blind) {
-      this.station.refuse("you look at another time: press Live to steer");
+      this.station.refuse(BLIND);
       released();
       return false;
     }
@@ -108,12 +110,4 @@ export class Steer {
 function stillAs({ rates, twist, frame, ...other }) {
   if (other.type === "drive") return { ...other, v: 0, w: 0 };
   return rates ? { rates: rates.map(() => 0) } : { twist: twist.map(() => 0), frame };
-}
-
-let steer = null;
-
-/** The page's only one. */
-export function steering(station) {
-  steer ??= new Steer(station);
-  return steer;
 }

@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import SERVE, Page, paged, station, until
 
-TOOL = "station.shared.drag.tool()"
+TOOL = "station.drag.tool()"
 HOLDS = "station.session.holds"
 
 
@@ -163,18 +163,18 @@ def test_the_tool_goes_where_it_is_dragged(page: Page) -> None:
     page.wait("!document.getElementById('handle').hidden")
     pane = page.page.locator("#pane").bounding_box()
     start = page.get(TOOL)
-    at = page.get(f"station.shared.drag.project({TOOL})")
+    at = page.get(f"station.drag.project({TOOL})")
     x, y = pane["x"] + at["x"], pane["y"] + at["y"]
     camera = page.get("station.scene.viewer.camera.position.toArray()")
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     page.page.mouse.move(x - 70, y - 45, steps=6)
-    target = page.get("station.shared.drag.target")
+    target = page.get("station.drag.target")
     assert target is not None
     page.shoot("drag")
     page.page.mouse.up()
     assert sum((a - b) ** 2 for a, b in zip(target, start, strict=True)) ** 0.5 > 0.05
-    page.wait("station.shared.drag.target === null")
+    page.wait("station.drag.target === null")
     page.rest()
     assert page.get(TOOL) == pytest.approx(target, abs=0.005)
     real = page.get("station.chain.toolAt(station.session.state.q)")
@@ -304,7 +304,9 @@ def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     page.page.select_option("#when", "now")
     before = page.virtual
     # Nobody steers by a picture of another time; a move that is planned is one's own business.
-    page.page.locator("button[aria-label='Joint 1 up']").click(delay=200)
+    up = page.page.locator("button[aria-label='Joint 1 up']")
+    assert up.get_attribute("title") == "You look at another time: press Live to steer."
+    up.click(delay=200, force=True)
     page.wait("document.getElementById('notice').textContent.includes('press Live to steer')")
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.press("q", delay=200)
@@ -334,8 +336,10 @@ def test_a_second_one_watches_until_control_is_given(browser: Any, server: Child
         second.shoot("watching")
         before = page.virtual
         second.page.evaluate("window.said = []; station.on('problem', (problem) => said.push(problem.text))")
-        second.page.click("[data-pose=ready]")
-        second.page.locator("button[aria-label='Joint 1 up']").click(delay=300)
+        second.page.click("[data-pose=ready]", force=True)
+        up = second.page.locator("button[aria-label='Joint 1 up']")
+        assert "has control" in up.get_attribute("title")
+        up.click(delay=300, force=True)
         second.page.keyboard.press("q", delay=300)
         # A page that pretends to have control is refused by the server.
         second.page.evaluate(
