@@ -201,7 +201,7 @@ class TimelineEdit:
 
 
 def _name_of(order: Order, t: float) -> CommandName | None:
-    """What an order's command is called from a time [s] on; None where it edits another one, which keeps its name."""
+    """What an order's command is called from a time [s] on; None where it edits another, which keeps its name."""
     if order.command is None or isinstance(order.command, Retime | Cancel | InsertVia | Redo):
         return None
     return CommandName.of(order.command, order.label, 0, t)
