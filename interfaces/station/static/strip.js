@@ -34,7 +34,9 @@ class Strip {
       seconds: this.view.seconds,
     });
     this.stale = true;
+    /** When it was drawn last [ms], and whether the time that was looked at went on then. */
     this.drawnAt = -Infinity;
+    this.played = false;
     /** When the next of the moves begins or ends [s]. */
     this.due = Infinity;
   }
@@ -109,8 +111,8 @@ class Strip {
     const { session, view } = this;
     const { now, timeline } = session;
     if (now === null || !timeline || document.hidden || (at - this.drawnAt < BETWEEN && !this.stale)) return false;
-    this.play((at - this.drawnAt) / 1000);
-    this.drawnAt = at;
+    this.play(this.played ? (at - this.drawnAt) / 1000 : 0);
+    [this.drawnAt, this.played] = [at, this.plays];
     if (view.advance(now, width) || this.stale || now >= this.due) this.draw(timeline, now);
     return true;
   }
