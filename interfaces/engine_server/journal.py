@@ -200,6 +200,13 @@ class TimelineEdit:
         return owner or None
 
 
+def _name_of(order: Order, t: float) -> CommandName | None:
+    """What an order's command is called from a time [s] on; None where it edits another, which keeps its name."""
+    if order.command is None or isinstance(order.command, Retime | Cancel | InsertVia | Redo):
+        return None
+    return CommandName.of(order.command, order.label, 0, t)
+
+
 class Journal:
     """The newest edits of one engine.
 
@@ -251,11 +258,15 @@ class Journal:
         engine = self.engine
         try:
             why = engine.undo_refusal() if order.command is None else ""
-            at = engine.now()
+            name = _name_of(order, engine.now())
             receipt = self.execute(order.command)
         except VrsError as error:
             return Outcome(order.number, now, None, str(error))
-        self._name(order, receipt, at)
+        if name is not None and receipt is not None and receipt.status is not Status.REJECTED:
+            last = self.names[-1] if self.names else None
+            if last is None or (last.command_id, last.label) != (receipt.command_id, name.label):
+                self._named = msgspec.structs.replace(name, command_id=receipt.command_id)
+                self.names.append(self._named)
         if receipt is None:
             return Outcome(order.number, now, None, why)
         known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
@@ -265,18 +276,6 @@ class Journal:
         except Exception:  # noqa: BLE001 - the command is carried out, whatever keeps the others from being named
             receipt = msgspec.structs.replace(receipt, shifted_names=(), superseded_names=())
         return Outcome(order.number, now, receipt, code=code)
-
-    def _name(self, order: Order, receipt: Receipt | None, t: float) -> None:
-        """Write down what a command is called from a time [s] on, unless that's known; edits don't rename it."""
-        command = order.command
-        if receipt is None or receipt.status is Status.REJECTED or command is None:
-            return
-        if isinstance(command, Retime | Cancel | InsertVia | Redo):
-            return
-        known = next((name for name in reversed(self.names) if name.command_id == receipt.command_id), None)
-        if known is None or known.label != order.label:
-            self._named = CommandName.of(command, order.label, receipt.command_id, t)
-            self.names.append(self._named)
 
     def look(self) -> int:
         """Write down what was done to the engine, here or by others; the number of the newest edit."""

@@ -34,6 +34,7 @@ from vrs import (
     ParameterChange,
     PoseTarget,
     Profile,
+    Redo,
     Resume,
     Retime,
     ScaleTime,
@@ -127,6 +128,7 @@ class Sites:
             plan.timeline, plan.limits, plan.lateness, plan.paused, plan.profiles, plan.session,
             [entry for i, entry in plan.ledger.entries.items() if i not in rejected],
             plan.ledger.changes, plan.ledger.versions, plan.ledger.stills, plan.ledger.undo_steps,
+            plan.ledger.redo_steps, plan.ledger.redo_version,
             plan.ledger.settled,
             robot.log.count, robot.log.waiting, robot.newest_sent, robot.command_ids,
             operator.halted, operator.epoch, self.site.journal.number, list(self.site.journal.edits),
@@ -230,7 +232,7 @@ def errors_of(code: CodeType) -> list[Exception]:
 
 
 X = MODEL.forward(MODEL.poses["nominal"])
-COMMANDS: dict[str, tuple[tuple[Command, ...], Command | None]] = {
+COMMANDS: dict[str, tuple[tuple[Command | None, ...], Command | None]] = {
     "move": ((), MotionCommand(JointTarget(READY), execute_at=1.5)),
     "move to a pose": ((), MotionCommand(PoseTarget(X), execute_at=1.5, insertion=Insertion.REPLACE)),
     "append": ((), MotionCommand(JointTarget(B), insertion=Insertion.APPEND)),
@@ -246,6 +248,7 @@ COMMANDS: dict[str, tuple[tuple[Command, ...], Command | None]] = {
     "scale": ((), ScaleTime(0.5)),
     "undo": ((), None),
     "undo what is under way": ((Stop(),), None),
+    "redo": ((None,), Redo()),
     "parameter": ((), ParameterChange("lateness", "reject")),
 }
 

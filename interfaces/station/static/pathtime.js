@@ -104,17 +104,9 @@ function projected(point, along, points, s, cell) {
   for (let low = first; low <= last; low++) {
     const [from, to] = [points[low], points[low + 1]];
     const piece = to.map((x, i) => x - from[i]);
-    const size = Math.max(
-      piece.reduce((sum, x) => sum + x * x, 0),
-      1e-300,
-    );
+    const size = Math.max(squared(to, from), 1e-300);
     const share = clamp(piece.reduce((sum, x, i) => sum + (point[i] - from[i]) * x, 0) / size, 0, 1);
-    const gap = Math.sqrt(
-      squared(
-        point,
-        from.map((x, i) => x + share * piece[i]),
-      ),
-    );
+    const gap = Math.sqrt(squared(point, from.map((x, i) => x + share * piece[i])));
     if (gap < distance) [distance, length] = [gap, along[low] + share * (along[low + 1] - along[low])];
   }
   return [distance, length];
@@ -167,11 +159,7 @@ export function comparePaths(t, leader, follower, { vMax, cell, vMin = 0.02 }) {
   const lower = Float64Array.from(along);
   for (let k = 1; k < upper.length; k++) upper[k] = Math.max(upper[k], upper[k - 1]);
   for (let k = lower.length - 2; k >= 0; k--) lower[k] = Math.min(lower[k], lower[k + 1]);
-  const crossing = firstArrival(
-    t,
-    upper.map((x, k) => (x + lower[k]) / 2),
-    s.subarray(0, reached),
-  );
+  const crossing = firstArrival(t, upper.map((x, k) => (x + lower[k]) / 2), s.subarray(0, reached));
   const [arrival, late, bounded] = [[], [], []];
   for (let j = 1; j < cells - 1; j++) {
     if (2 * cell <= vMin * (reachedAt[j + 1] - reachedAt[j - 1])) continue;

@@ -57,7 +57,8 @@ async function give({ commands, session, replace }) {
 }
 
 /** The button that loads a plan file; asked first is whether it takes the place of what is planned. */
-export function Loader({ strip: { station, session, idle }, tool }) {
+export function Loader({ station, tool }) {
+  const { session, idle } = station;
   const input = useRef(null);
   const [found, setFound] = useState(null);
 

@@ -34,7 +34,9 @@ class Strip {
       seconds: this.view.seconds,
     });
     this.stale = true;
+    /** When it was drawn last [ms], and whether the time that was looked at went on then. */
     this.drawnAt = -Infinity;
+    this.played = false;
     /** When the next of the moves begins or ends [s]. */
     this.due = Infinity;
   }
@@ -45,12 +47,6 @@ class Strip {
     const parts = this.session.timeline?.segments.filter(({ commandId }) => commandId === this.chosen) ?? [];
     const last = parts.at(-1);
     return last ? { id: this.chosen, start: parts[0].start, end: last.start + last.duration } : undefined;
-  }
-
-  /** Why nothing can be commanded from here now; "" where it can. */
-  get idle() {
-    if (this.session.link !== "live") return "there's no connection";
-    return this.session.holds ? "" : "take control first";
   }
 
   retime(id, start) {
@@ -115,8 +111,8 @@ class Strip {
     const { session, view } = this;
     const { now, timeline } = session;
     if (now === null || !timeline || document.hidden || (at - this.drawnAt < BETWEEN && !this.stale)) return false;
-    this.play((at - this.drawnAt) / 1000);
-    this.drawnAt = at;
+    this.play(this.played ? (at - this.drawnAt) / 1000 : 0);
+    [this.drawnAt, this.played] = [at, this.plays];
     if (view.advance(now, width) || this.stale || now >= this.due) this.draw(timeline, now);
     return true;
   }
@@ -153,13 +149,15 @@ function Tool({ station, id, icon, title, why = "", does, children, ...others })
 }
 
 function Tools({ strip }) {
-  const { station, session, idle, chosen, moves, plays } = strip;
+  const { station, session, chosen, moves, plays } = strip;
+  const { idle } = station;
   const [place, setPlace] = useState("up");
   const old = session.link !== "live";
   // It's drawn anew where it begins and ends, not for each time between.
   const past = useComputed(() => station.cursor !== null).value;
   const over = moves && chosen !== null && !(strip.move?.end > (session.now ?? 0));
-  const why = idle || (chosen === null ? "choose a move on the strip first" : over ? "this move is over" : "");
+  const none = strip.move ? "this move is over" : "the chosen move isn't in the plan any more";
+  const why = idle || (chosen === null ? "choose a move on the strip first" : over ? none : "");
   const poses = Object.keys(session.welcome?.poses ?? {});
   const tool = (id, icon, title, does, children, others) =>
     html`<${Tool} station=${station} id=${id} icon=${icon} title=${title} does=${does} ...${others}>${children}<//>`;
@@ -181,7 +179,7 @@ function Tools({ strip }) {
     <span class="gap"></span>
     ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
       { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
-    <${Loader} strip=${strip} tool=${tool} />
+    <${Loader} station=${station} tool=${tool} />
     <span class="grow"></span>
     <span class="muted wide">Drag a scheduled move, or the strip to look back</span>
     ${tool("zoom-out", "remove", "Show more time", () => strip.zoom(1))}
