@@ -7,13 +7,6 @@ const CLOSE = 0.25;
 /** More begins than these say nothing any more. */
 const MOST = 40;
 
-/** Kinds of lines: name, what it means. */
-export const KINDS = [
-  ["begin", "a move begins"],
-  ["corrected", "virtual robot put right"],
-  ["halted", "real robot stopped, or lost"],
-];
-
 export class Happenings {
   constructor(station) {
     this.session = station.session;

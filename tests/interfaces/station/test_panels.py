@@ -13,7 +13,7 @@ from vrs.errors import InvalidValueError
 
 ARM = """pane drag link control theme stop jog receipts plots terminal network record strip hints"""
 STATIC = Path(interfaces.station.__file__).parent / "static"
-BASE = """floor link control theme stop drive map jobs camera deviation network record hints"""
+BASE = """floor link control theme stop drive map jobs camera plots network record hints"""
 
 
 def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:
@@ -21,7 +21,7 @@ def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:
     everything = {Offer.ARCS, Offer.JOBS, Offer.CAMERA, Offer.RECORDINGS}
     assert [p.name for p in panels_of(everything)] == BASE.split()
     bare = {p.name for p in panels_of({Offer.ARCS})}
-    assert {"floor", "drive", "deviation"} <= bare
+    assert {"floor", "drive", "plots"} <= bare
     assert not bare & {"map", "jobs", "camera", "record"}
 
 
