@@ -458,12 +458,9 @@ def _language_table(part: str, parts: list[str]) -> list[str]:
             return _table(("word", "is"), [(f"`{word}`", said) for word, said in forms.WORDS.items()])
         case "formats":
             return _table(("item", "does"), [(f"`/{item}`", said) for item, said in forms.FORMATS.items()])
-        case "unavailable":
-            return _table(
-                ("word", "why"), [(f"`{word}`", said) for word, said in sorted(forms.UNAVAILABLE.items())]
-            )
-        case "passed":
-            return [_listed(sorted(forms.IGNORED - forms.UNAVAILABLE.keys()))]
+        case "unavailable" | "passed":
+            words = forms.PASSED if kind == "passed" else forms.UNAVAILABLE
+            return _table(("word", "why"), [(f"`{word}`", said) for word, said in sorted(words.items())])
     raise KeyError(kind)
 
 

@@ -10,7 +10,7 @@ import resource
 import secrets
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,19 @@ def read_within(path: Path, most: int) -> bytes:
     if len(data) > most:
         raise FormatError(str(path), f"is longer than the {most} bytes allowed")
     return data
+
+
+@contextlib.contextmanager
+def written(where: Path, problem: str = "can't be written") -> Iterator[None]:
+    """Let what's written meanwhile fail with one clear error.
+
+    Raises:
+        FormatError: If the disk doesn't take it: where it was to go, the problem, and what the system says.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise FormatError(str(where), f"{problem}: {error.strerror or error}") from None
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, Seed, option
+from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, Seed, bars, option
+from interfaces.system import written
 from robots.robot import USUAL, load
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from interfaces.link import DelayProfile, Service
+    from interfaces.link import DelayProfile
     from interfaces.recording.run_recorders import RunRecorder
-    from interfaces.runs.summary import Attribution, OffsetOutcome
+    from interfaces.runs.summary import Measures, OffsetOutcome
     from interfaces.runs.twin_run import TwinRun
     from interfaces.runtime.plan import RunPlan
     from robots.robot import Robot
@@ -28,6 +29,8 @@ RECORDING = "run.mcap"
 """Name of a run's recording."""
 RESULTS = ("report.html", "summary.json", RECORDING)
 """What a run leaves."""
+NO_ROOM = "can't hold the results"
+"""What is wrong with a directory."""
 DEFAULT_SEED = 6
 """With it the default link stalls four times in mid-motion, so that the report has something to explain."""
 
@@ -45,7 +48,7 @@ def demo(
     """Run virtual and real robot on one plan across an emulated internet, and compare them."""
     from interfaces.link import Conditions, delay_profile
     from interfaces.recording.run_recorders import RunRecorder
-    from interfaces.runs.summary import summarize
+    from interfaces.runs.summary import to_json
     from interfaces.runs.twin_run import fixed_offset
     from interfaces.runtime.plan import default_plan, read_plan
 
@@ -55,13 +58,9 @@ def demo(
     plan = default_plan(robot.arm) if commands is None else read_plan(commands, robot.arm)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
-    run, attributions, offsets = explained(plan, recorder, robot, profile, seed, D, order)
-    recorder.finish(attributions, offsets)
-    summary = summarize(run, attributions, offsets)
-    text = write(summary, run, out)
-    complain(recorder)
+    summary = conclude(plan, None, recorder, out, robot, profile, D=D, seed=seed, service=order)
     if as_json:
-        typer.echo(text, nl=False)
+        typer.echo(to_json(summary), nl=False)
     else:
         show(summary, out, recorded=not recorder.problem)
 
@@ -76,52 +75,73 @@ def prepare(out: Path, *names: str) -> None:
     Raises:
         FormatError: If it can't be made or written to, or a directory stands where a file is to be.
     """
-    try:
+    with written(out, NO_ROOM):
         out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=out):
-            pass
-    except OSError as error:
-        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
+        tempfile.TemporaryFile(dir=out).close()
     for name in names:
         if (out / name).is_dir():
-            raise FormatError(str(out / name), "can't hold the results: it's a directory, and is to be a file")
+            raise FormatError(str(out / name), f"{NO_ROOM}: it's a directory, and is to be a file")
 
 
-def complain(recorder: RunRecorder) -> None:
-    """Say why a recording isn't whole, where it isn't."""
-    if recorder.problem:
-        typer.echo(f"vrs: {recorder.problem}", err=True)
-
-
-def explained(
+def conclude(
     plan: RunPlan,
-    whole: TwinRun | RunRecorder,
-    robot: Robot,
-    profile: DelayProfile,
-    seed: int,
+    run: TwinRun | None,
+    recorder: RunRecorder,
+    out: Path,
+    *where: Any,
     D: float | None,
-    service: Service,
-) -> tuple[TwinRun, tuple[Attribution, ...], tuple[OffsetOutcome, ...]]:
-    """Run a plan on both twins, and again under other conditions, for what made them differ.
+    **link: Any,
+) -> dict[str, Any]:
+    """Run a plan under other conditions too, close the recording, and write `report.html` and `summary.json`.
+
+    Why a recording isn't whole is said on standard error.
 
     Args:
         plan: What the operator does.
-        whole: The run itself, where it has been made; else what records it.
-        robot: Which arm.
-        profile: The link's delay.
-        seed: Seed of the link.
+        run: The run itself, where it has been made; else the recorder has it.
+        recorder: Of the run.
+        out: Where the results go.
+        *where: Which arm, and the link's delay.
         D: The offset [s]; None adapts it.
-        service: Order of delivery on the link.
-    """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+        **link: `seed`, and `service`, the order of delivery.
 
-    from interfaces.runs.summary import CAUSES, attribute, measures
-    from interfaces.runs.twin_run import FIXED, TwinRun, fixed_offset, spelled
+    Returns:
+        The summary.
+
+    Raises:
+        FormatError: If they can't be written.
+    """
+    from interfaces.report.html import write_report
+    from interfaces.runs.summary import attribute, summarize, to_json
+
+    stages, offsets = _explained(plan, run, recorder, *where, D=D, **link)
+    attributions = attribute(tuple(measured for _, measured in stages))
+    recorder.finish(attributions, offsets)
+    summary = summarize(stages[0][0], attributions, offsets)
+    with written(out, NO_ROOM):
+        (out / "summary.json").write_text(to_json(summary), encoding="utf-8")
+        write_report(out / "report.html", stages[0][0], summary)
+    if recorder.problem:
+        typer.echo(f"vrs: {recorder.problem}", err=True)
+    return summary
+
+
+def _explained(
+    plan: RunPlan,
+    run: TwinRun | None,
+    recorder: RunRecorder,
+    robot: Robot,
+    profile: DelayProfile,
+    *,
+    D: float | None,
+    **link: Any,
+) -> tuple[list[tuple[TwinRun, Measures]], tuple[OffsetOutcome, ...]]:
+    """The run, and runs with ever more causes of error off; and what other offsets make of the network."""
+    from interfaces.runs.summary import CAUSES, measures
+    from interfaces.runs.twin_run import FIXED, fixed_offset, spelled
     from interfaces.runtime.session import offset_outcome, run_without
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), redirect_stdout=False) as bar:
+    with bars("{task.description}", "{task.percentage:>3.0f}%") as bar:
 
         def shown(name: str) -> Callable[[float], None]:
             task = bar.add_task(f"{name:30}", total=_length(plan))
@@ -133,50 +153,26 @@ def explained(
 
         stages, offsets = [], []
         for off in range(len(CAUSES) + 1):
-            name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
-            causes = frozenset(CAUSES[:off])
-            if not off and isinstance(whole, TwinRun):
-                run = whole
-            else:
-                keeper = None if off or isinstance(whole, TwinRun) else whole
-                run = run_without(
-                    causes, plan, robot, profile,
-                    seed=seed, offset=D, service=service, progress=shown(name), keeper=keeper,
-                )  # fmt: skip
-            stages.append((run, measures(run)))
+            made = None if off else run
+            if made is None:
+                name = f"without {CAUSES[off - 1].replace('_', ' ')}" if off else "both twins"
+                causes, keeper = frozenset(CAUSES[:off]), None if off else recorder
+                made = run_without(
+                    causes, plan, robot, profile, offset=D, progress=shown(name), keeper=keeper, **link
+                )
+            stages.append((made, measures(made)))
             finished()
         for other in (None, fixed_offset(FIXED, profile) if D is None else D):
             progress = shown(f"offset {spelled(other)}")
-            outcome = offset_outcome(
-                plan, robot, profile, seed=seed, offset=other, service=service, progress=progress
-            )
-            offsets.append(outcome)
+            offsets.append(offset_outcome(plan, robot, profile, offset=other, progress=progress, **link))
             finished()
-    return stages[0][0], attribute(tuple(measured for _, measured in stages)), tuple(offsets)
+    return stages, tuple(offsets)
 
 
 def _length(plan: RunPlan) -> float:
     """A guess at how long the run will be [s]; the bar is full at the end, whatever it was."""
     times = (motion.command.execute_at or motion.registered_at for motion in plan.motions)
     return max(times, default=0.0) + 8.0
-
-
-def write(summary: dict[str, Any], run: TwinRun, out: Path) -> str:
-    """Write `report.html` and `summary.json`; the latter's text.
-
-    Raises:
-        FormatError: If they can't be written.
-    """
-    from interfaces.report.html import write_report
-    from interfaces.runs.summary import to_json
-
-    text = to_json(summary)
-    try:
-        (out / "summary.json").write_text(text, encoding="utf-8")
-        write_report(out / "report.html", run, summary)
-    except OSError as error:
-        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
-    return text
 
 
 def show(summary: dict[str, Any], out: Path, *, recorded: bool, err: bool = False) -> None:
@@ -190,13 +186,6 @@ def tables(summary: dict[str, Any], *, err: bool = False) -> None:
     """Show a summary's tables, on standard error if asked for."""
     from rich.console import Console
 
-    from interfaces.report.tables import attribution_table, error_table, offset_table, time_lines
+    from interfaces.report.tables import rich_tables
 
-    console = Console(stderr=err)
-    console.print(error_table(summary))
-    if summary["attribution"]:
-        console.print(attribution_table(summary))
-    if summary["offsets"]:
-        console.print(offset_table(summary))
-    for line in time_lines(summary):
-        console.print(line, highlight=False)
+    Console(stderr=err, markup=False).print(*rich_tables(summary), sep="\n")

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
-from vrs.errors import FormatError, InvalidValueError
+from interfaces.system import written
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from interfaces.recording.recording import Recording
@@ -51,7 +52,5 @@ def _report(recording: Recording, path: Path) -> None:
     text, missing = render(recording)
     for line in missing:
         typer.echo(f"vrs: {recording.path.name}: missing: {line}", err=True)
-    try:
+    with written(path):
         path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise FormatError(str(path), f"can't be written: {error.strerror}") from None

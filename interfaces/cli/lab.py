@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import PROFILES, Workers, argument, option
+from interfaces.cli.options import PROFILES, Workers, argument, bars, option
 from interfaces.cli.reproduce import measured, show
 from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
@@ -241,12 +241,8 @@ def _once(name: str, given: Sequence[object]) -> None:
 
 
 def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     from interfaces.lab.runner import pooled
 
-    columns = (TextColumn(what), BarColumn(), TextColumn("{task.completed}/{task.total}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with bars(what) as bar:
         task = bar.add_task(what, total=len(calls))
         return pooled(calls, workers=workers, progress=lambda _: bar.advance(task))

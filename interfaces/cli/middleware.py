@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import option
+from interfaces.cli.options import bars, option
+from interfaces.system import written
 from vrs.errors import FormatError
 
 if TYPE_CHECKING:
@@ -38,10 +40,8 @@ def train(
 
     _hold(out)
     network = _trained(TrainingConfig(epsilon=epsilon, neurons=neurons, epochs=epochs), seed)
-    try:
+    with written(out, "can't hold the network"):
         out.write_text(network.to_json(), encoding="utf-8")
-    except OSError as error:
-        raise FormatError(str(out), f"can't hold the network: {error.strerror}") from None
     found = _tested(network)
     if as_json:
         import json
@@ -61,21 +61,11 @@ def _hold(out: Path) -> None:
 
 
 def _trained(config: TrainingConfig, seed: int) -> GainNetwork:
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     from interfaces.middleware import train
 
-    columns = (TextColumn("training"), BarColumn(), TextColumn("{task.fields[error]}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("training", total=config.epochs, error="")
-        return train(
-            config,
-            seed=seed,
-            progress=lambda epoch, error: bar.update(
-                task, completed=epoch, error=f"mean squared error {error:.1e}"
-            ),
-        )
+    with bars("training", "mean squared error {task.fields[error]:.1e}") as bar:
+        task = bar.add_task("training", total=config.epochs, error=math.inf)
+        return train(config, seed=seed, progress=lambda k, error: bar.update(task, completed=k, error=error))
 
 
 def _tested(network: GainNetwork) -> dict[str, dict[str, float]]:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import asyncio
     from contextlib import AsyncExitStack
 
+    from rich.progress import Progress
+
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
@@ -247,6 +249,20 @@ def left_out(ctx: typer.Context, why: str, options: Iterable[str]) -> None:
             raise InvalidValueError(name, str(value), f"left out: {why}")
 
 
+def bars(before: str, after: str = "{task.completed}/{task.total}") -> Progress:
+    """Bars on standard error for what takes long, with the time so far: to be entered.
+
+    Args:
+        before: What stands before a bar, as a format of its `task`.
+        after: What stands behind it.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = TextColumn(before), BarColumn(), TextColumn(after), TimeElapsedColumn()
+    return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
+
+
 def room_of(text: str) -> Room:
     """A room by its name, or of a file.
 
@@ -294,6 +310,28 @@ def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
     return read_tokens(token_file) if token_file.exists() else make_tokens(token_file)
 
 
+def class_access(host: str, token_file: Path | None) -> tuple[Access, str | None]:
+    """Who may come in of a class: by codes, and by tokens; and the teacher's token where no file has one.
+
+    Args:
+        host: Where it listens.
+        token_file: Read, or made if it's missing.
+
+    Raises:
+        InvalidValueError: If other machines would come in without tokens, or the file has no teacher's.
+        FormatError: If the file can't be used.
+    """
+    from interfaces.messages.control import Role
+    from interfaces.stream.access import Access, make_token
+    from interfaces.stream.invitations import Invitations
+
+    tokens = tokens_for(host, token_file)
+    if tokens is not None and Role.ADMIN not in tokens:
+        raise InvalidValueError("token-file", str(token_file), "a file with the token of an admin, who teaches")
+    made = make_token() if tokens is None else None
+    return Access({Role.ADMIN: made} if made else tokens, free=(), invitations=Invitations(0.0)), made
+
+
 def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
     """Who may come in: with a token file whoever has a token, without one whoever is on this machine.
 
@@ -312,11 +350,29 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
     return Access(free=free) if tokens is None else Access(tokens, free=())
 
 
+def _is_any(host: str) -> bool:
+    """Whether a host stands for all addresses of this machine."""
+    return host in {"0.0.0.0", "::"}  # noqa: S104 - compared, not listened on
+
+
+def shown_host(host: str) -> str:
+    """By what others of its network reach a server that listens on a host."""
+    if not _is_any(host):
+        return host
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            # Nothing is sent: that's what the system would send from.
+            probe.connect(("192.0.2.1", 9))
+        except OSError:
+            return socket.gethostname()
+        return str(probe.getsockname()[0])
+
+
 def names_of(host: str) -> list[str]:
     """Names by which a server is rightly addressed that listens on a host."""
     if is_loopback(host):
         return ["127.0.0.1", "localhost", "::1"]
-    if host not in {"0.0.0.0", "::"}:  # noqa: S104 - compared, not listened on
+    if not _is_any(host):
         return [host]
     own = socket.gethostname()
     try:
@@ -326,12 +382,13 @@ def names_of(host: str) -> list[str]:
     return sorted({"127.0.0.1", "localhost", "::1", own, *found})
 
 
-def asked_for(host: str, also: Iterable[str]) -> Hosts:
+def asked_for(host: str, also: Iterable[str], *names: str) -> Hosts:
     """What the Host of a request may be, by the port that a server listens on.
 
     Args:
         host: Where it listens.
         also: Other addresses that it's reached by, just as a browser's address line has them.
+        *names: Other names of this machine, at that port.
 
     Raises:
         InvalidValueError: If one of those is no address.
@@ -344,7 +401,7 @@ def asked_for(host: str, also: Iterable[str]) -> Hosts:
     def allowed(port: int) -> frozenset[str]:
         from interfaces.stream.access import hosts
 
-        return hosts(names_of(host), port).union(others)
+        return hosts([*names_of(host), *names], port).union(others)
 
     return allowed
 

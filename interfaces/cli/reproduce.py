@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import Workers, argument, option
+from interfaces.cli.options import Workers, argument, bars, option
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
@@ -72,13 +72,9 @@ def reproduce(
 
 def measured(paper: Paper, study: Study, workers: int) -> Reproduction:
     """Measure a paper's claims, with a bar for each part."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     from interfaces.lab import reproduce as measure
 
-    columns = (TextColumn("{task.description:26}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bar:
+    with bars("{task.description:26}") as bar:
         tasks = {part.title: bar.add_task(part.title, total=len(part.cases)) for part in paper.parts}
         return measure(paper, study, workers=workers, progress=lambda title: bar.advance(tasks[title]))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from interfaces.cli.options import argument, option
+from interfaces.system import written
 
 if TYPE_CHECKING:
     from interfaces.rsp.model import Element, RobotModel
@@ -34,14 +35,10 @@ def new(
 ) -> None:
     """Write a small model with one element of each kind, to begin with."""
     from interfaces.rsp.model import example, write_model
-    from vrs.errors import FormatError
 
     text = write_model(example(name, model_id))
-    try:
-        with file.open("xb") as target:
-            target.write(text)
-    except OSError as error:
-        raise FormatError(str(file), f"can't be written: {error.strerror}") from None
+    with written(file), file.open("xb") as target:
+        target.write(text)
     typer.echo(f"Wrote {file}")
 
 
@@ -62,8 +59,8 @@ def show(file: ModelFile, as_json: AsJson = False) -> None:
     heads = ("bit", "element", "kind", "down [B]", "up [B]", "values")
     table = table_of(title, heads, left=("element", "kind", "values"))
     for row in facts["elements"]:
-        table.add_row(*(("" if cell is None else str(cell)).replace("[", r"\[") for cell in row.values()))
-    Console().print(table)
+        table.add_row(*("" if cell is None else str(cell) for cell in row.values()))
+    Console(markup=False).print(table)
 
 
 @model.command(short_help="What is wrong with a model")

@@ -14,11 +14,9 @@ from interfaces.cli.demo import (
     DEFAULT_SEED,
     RECORDING,
     RESULTS,
-    complain,
-    explained,
+    conclude,
     prepare,
     show,
-    write,
 )
 from interfaces.cli.options import (
     Delay,
@@ -54,6 +52,9 @@ def run(
     seed: Annotated[int, option("N", "Seed of everything random, RANDOM too.", min=0)] = DEFAULT_SEED,
     dialect: DialectName = "",
     files: ProgramFiles = None,
+    corrections: Annotated[
+        Path | None, option("FILE.csv", "Corrections of the path while the program says ALTER.")
+    ] = None,
     out: Out = Path("out"),
     limit: Annotated[float, option("S", "When the program is given up [s].", min=1, max=3600)] = 600.0,
 ) -> None:
@@ -63,8 +64,8 @@ def run(
     """
     from interfaces.link import Conditions, delay_profile
     from interfaces.recording.run_recorders import RunRecorder
-    from interfaces.runs.summary import summarize
     from interfaces.runs.twin_run import fixed_offset
+    from interfaces.val2.corrections import read_corrections
     from interfaces.val2.playing import Listeners
     from interfaces.val2.source import joined
     from interfaces.val2.twins import play
@@ -72,19 +73,15 @@ def run(
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
     source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name)
-    directory = program_files(files)
+    directory, corrected = program_files(files), None if corrections is None else read_corrections(corrections)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)
     played = play(
         source, robot, profile,
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
-        files=directory, keeper=recorder,
+        files=directory, corrections=corrected, keeper=recorder,
     )  # fmt: skip
-    whole, attributions, offsets = explained(played.plan, played.run, robot, profile, seed, D, order)
-    recorder.finish(attributions, offsets)
-    summary = summarize(whole, attributions, offsets)
-    write(summary, whole, out)
-    complain(recorder)
+    summary = conclude(played.plan, played.run, recorder, out, robot, profile, D=D, seed=seed, service=order)
     show(summary, out, recorded=not recorder.problem, err=True)
     if played.error is not None:
         raise played.error

@@ -31,6 +31,7 @@ from interfaces.cli.options import (
     access_for,
     asked_for,
     check_taken,
+    class_access,
     collect_at_leisure,
     end_on_signal,
     end_with_input,
@@ -40,6 +41,7 @@ from interfaces.cli.options import (
     room_of,
     say_lost,
     say_robot,
+    shown_host,
     speaks_val,
     start_robot,
     untaken,
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
+    from interfaces.stream.join import JoinPages
     from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
@@ -109,6 +112,13 @@ def serve(
     robot_token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
+    class_: Annotated[
+        bool,
+        option(
+            "--class",
+            "Let a class in by short codes that are printed here, with QR codes; control is queued for.",
+        ),
+    ] = False,
     val_port: Annotated[
         int | None,
         option(
@@ -167,7 +177,8 @@ def serve(
     else:
         policy, advice = None if robot_at is not None else LossPolicy.HALT, ""
     at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
-    allowed = asked_for(host, reached_as or ())
+    own = shown_host(host)
+    allowed = asked_for(host, reached_as or (), *([own] if class_ else ()))
     token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
     check_taken(robots, ctx)
     place = room_of(room)
@@ -197,7 +208,7 @@ def serve(
         "offset": behind, "max-age": f"{max_age:g}", "body": body, "room": room, "architecture": architecture,
         "operator-loss": operator_loss,
     }  # fmt: skip
-    access = access_for(host, token_file, free=OPEN)
+    access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []
     for k, (robot, name, path) in enumerate(zip(robots, names, records, strict=True)):
@@ -212,7 +223,8 @@ def serve(
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
             behind, architecture, folder,
         ))  # fmt: skip
-    uvloop.run(_serve(serving, access, host, port, allowed, until_eof=until_eof))
+    taught = _Class(own, reached_as[0] if reached_as else "", teacher) if class_ else None
+    uvloop.run(_serve(serving, access, host, port, allowed, taught, until_eof=until_eof))
 
 
 def _own(path: Path, k: int, robot: Robot) -> Path:
@@ -272,8 +284,47 @@ class _Serving:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class _Class:
+    """How a class comes in."""
+
+    host: str
+    """By which others of the network reach this machine."""
+    reached_as: str
+    """By what they reach the server, where that's not by its own address; empty where it is."""
+    teacher: str | None = field(repr=False)
+    """The token that was made for the teacher; None where a file has one."""
+
+    def pages(self, access: Access, clock: Clock, port: int) -> JoinPages:
+        """What tells the codes, of a server that listens on a port."""
+        from interfaces.link.proxy import Address
+        from interfaces.stream.join import JoinPages
+
+        assert access.invitations is not None
+        base = f"http://{self.reached_as or Address(self.host, port)}/"
+        return JoinPages(access.invitations, access, clock, base)
+
+
+async def _show_codes(pages: JoinPages) -> None:
+    """Print the codes of a class whenever there are new ones."""
+    import asyncio
+
+    while True:
+        text, left = pages.shown(pictures=sys.stdout.isatty())
+        # Nobody waits for a terminal that takes no lines.
+        await asyncio.to_thread(typer.echo, text, nl=False)
+        await asyncio.sleep(left)
+
+
 async def _serve(
-    serving: Sequence[_Serving], access: Access, host: str, port: int, allowed: Hosts, *, until_eof: bool
+    serving: Sequence[_Serving],
+    access: Access,
+    host: str,
+    port: int,
+    allowed: Hosts,
+    taught: _Class | None,
+    *,
+    until_eof: bool,
 ) -> None:
     """Run until a signal comes. The page is there before the robots are."""
     import asyncio
@@ -341,7 +392,8 @@ async def _serve(
                 others.append(Mount(one.folder, routes=routes))
             else:
                 first = routes
-        app = application([*others, *first], allowed(shown.port))
+        joining = None if taught is None else taught.pages(access, clock, shown.port)
+        app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port))
         for part in (sockets.serve(app, listening), *parts):
             await stack.enter_async_context(part)
         keep_quiet()
@@ -362,7 +414,12 @@ async def _serve(
             typer.echo(f"vrs: VAL-II on {HOST} port {val_listening.getsockname()[1]}")
             if val_token is not None:
                 typer.echo(f"vrs: VAL-II asks each terminal for a token, the first line to send: {val_token}")
+        if taught is not None and taught.teacher is not None:
+            typer.echo(f"vrs: token of the teacher, an admin: {taught.teacher}")
         sys.stdout.flush()
+        if joining is not None:
+            showing = asyncio.create_task(_show_codes(joining))
+            stack.callback(showing.cancel)
         if until_eof:
             end_with_input(ended)
         ending = asyncio.create_task(ended.wait())

@@ -9,7 +9,7 @@ from typing import Final, Literal
 import msgspec
 
 from interfaces.messages.jobs import JobList, Progress
-from interfaces.system import read_within, write_whole
+from interfaces.system import read_within, write_whole, written
 from vrs.errors import FormatError, InvalidValueError
 
 SCHEMA: Final = "vrs.jobs"
@@ -59,13 +59,11 @@ class JobFile:
         Raises:
             FormatError: If it can't be written.
         """
-        try:
+        with written(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             if self._damaged and self.path.is_file():
                 self.path.rename(self._beside())
             write_whole(self.path, written_jobs(jobs, progress))
-        except OSError as error:
-            raise FormatError(str(self.path), f"can't be written: {error.strerror}") from None
         self._damaged = False
 
     def _beside(self) -> Path:

@@ -217,11 +217,11 @@ class ProblemCode(enum.StrEnum):
     VERSION = "version"
     """No common version of the protocol."""
     REFUSED = "refused"
-    """The token isn't right for the role."""
+    """The token isn't right for the role, or the code isn't one that counts."""
     FULL = "full"
     """Too many clients."""
     LEASE = "lease"
-    """It's held, it's ending, or only an admin may do that; the text says which."""
+    """It's held, it's ending, it's offered to somebody else, or only an admin may do that; the text says which."""
     STALE_EPOCH = "stale-epoch"
     """The epoch isn't the one in force."""
     STOPPING = "stopping"
@@ -243,7 +243,7 @@ class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     name: Name
     """For people."""
     token: Word | None = None
-    """Of the role. Needed off loopback, and always for `admin`."""
+    """Of the role. Needed off loopback, and always for `admin`. In a class a code will do."""
     session: Word | None = None
     """Of an earlier `Welcome`, to go on with it."""
     link_loss: Word | None = None
@@ -269,6 +269,12 @@ class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
     """How the one before ended; absent: there was none."""
     shared: bool = False
     """Whether the receiver shares it: it commands under the epoch, but doesn't keep it."""
+    member: Count = 0
+    """In a class, the receiver's number in `Present`; 0: there's no class."""
+    waiting: Count = 0
+    """In a class, the receiver's place in the queue, from 1; 0: it isn't in it."""
+    offered_until: Time | None = None
+    """In a class: the lease is offered to the receiver, to be acquired until then [s]; absent: it isn't."""
 
     @property
     def commands(self) -> bool:
@@ -422,6 +428,72 @@ class Share(Message, frozen=True, omit_defaults=True, gc=False, tag="share"):
     number: Number
     session: Word
     """The holder's, from its `Welcome`: whoever knows it was told by the holder."""
+
+
+class RequestControl(Message, frozen=True, omit_defaults=True, gc=False, tag="request-control"):
+    """In a class: the lease if it's offered, or free and nobody waits for it; else a place in the queue."""
+
+    sender: ClassVar[Party] = Party.OPERATOR
+    number: Number
+
+
+class Withdraw(Message, frozen=True, omit_defaults=True, gc=False, tag="withdraw"):
+    """In a class: gives a place in the queue up, and what is offered."""
+
+    sender: ClassVar[Party] = Party.OPERATOR
+    number: Number
+    member: Number | None = None
+    """Whose place, by the number in `Present`; absent: one's own. Only an admin takes others out of the queue."""
+
+
+class GiveControl(Message, frozen=True, omit_defaults=True, gc=False, tag="give-control"):
+    """In a class: takes the lease from whoever has it, and offers it to somebody, before all who wait."""
+
+    sender: ClassVar[Party] = Party.ADMIN
+    number: Number
+    member: Number
+    """To whom, by the number in `Present`."""
+
+
+class Who(Message, frozen=True, omit_defaults=True, gc=False, tag="who"):
+    """In a class: who is here? Another answer follows whenever that changes."""
+
+    sender: ClassVar[Party] = Party.CLIENT
+    number: Number
+
+
+MOST_PRESENT = 100
+"""Clients that a list of those present names."""
+
+
+class Member(Record, frozen=True, omit_defaults=True, gc=False):
+    """A client of a class."""
+
+    number: Number
+    """Its own, as long as its session goes on."""
+    name: Name
+    """No two have the same."""
+    role: Role
+    waiting: Count = 0
+    """Its place in the queue, from 1; 0: it isn't in it."""
+
+
+class Present(Message, frozen=True, omit_defaults=True, gc=False, tag="present"):
+    """Who is here; the newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    members: Annotated[tuple[Member, ...], Meta(max_length=MOST_PRESENT)] = ()
+    """Who has the lease comes first, then who waits, in order, then the others."""
+    others: Count = 0
+    """So many more are here."""
+    holder: Count = 0
+    """Number of who has the lease; 0: nobody of them."""
+    offered: Count = 0
+    """Number of who it's offered to; 0: nobody."""
+    offered_until: Time | None = None
+    """The offer stands until then [s]."""
+    answers: Number | None = None
+    """Number of the receiver's request that this answers."""
 
 
 class Resume(Leased, frozen=True, omit_defaults=True, gc=False, tag="resume"):
@@ -616,11 +688,13 @@ class Corrected(Message, frozen=True, omit_defaults=True, gc=False, tag="correct
     """What keeps the arm from following in time; empty where nothing does."""
 
 
-LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume
+QueueWish: TypeAlias = RequestControl | Withdraw | GiveControl
+"""What a client of a class asks of the queue."""
+LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume | QueueWish
 """What a client asks of the lease; a `Lease` or a `Problem` answers it."""
-Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem | PathCorrection
+Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem | PathCorrection | Who
 """Control messages that a client sends."""
-Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | Corrected
+Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | Corrected | Present
 """Control messages that a server sends."""
 
 

@@ -21,7 +21,8 @@ from interfaces.recording.poses import quaternions
 from interfaces.recording.recording import Deed, Recording
 from interfaces.recording.track import ESTIMATED, MEASURED
 from interfaces.runs.summary import UNIT
-from vrs.errors import FormatError, InvalidValueError
+from interfaces.system import written
+from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.mobile import ArcTimeline
 from vrs.model import Array, unit_of
@@ -309,11 +310,9 @@ def write_parquet(found: Iterable[RecordingTable], folder: Path) -> tuple[Path, 
 
 def _written(folder: Path, kind: str, table: RecordingTable, write: Callable[[Path, RecordingTable], None]) -> Path:
     path = folder / f"{table.name}.{kind}"
-    try:
+    with written(path):
         folder.mkdir(parents=True, exist_ok=True)
         write(path, table)
-    except OSError as error:
-        raise FormatError(str(path), f"can't be written: {error.strerror or error}") from None
     return path
 
 

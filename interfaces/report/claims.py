@@ -10,11 +10,14 @@ from typing import Any, Final
 
 from interfaces.lab.output import SCHEMA
 from interfaces.report.pages import page
+from interfaces.system import read_within, written
 from vrs.errors import FormatError
 
 Json = Mapping[str, Any]
 COLUMNS: Final = ("claim", "source", "expected", "measured", "interval", "holds")
 """What each claim says of itself."""
+LARGEST: Final = 64 * 2**20
+"""Longest file that is read [byte]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +54,9 @@ def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
     Raises:
         FormatError: If it's neither, or can't be read.
     """
+    data = read_within(path, LARGEST)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
+        document = json.loads(data)
     except ValueError as error:
         raise FormatError(str(path), f"isn't JSON: {error}") from None
     try:
@@ -75,7 +77,10 @@ def _study(path: Path, document: Json) -> ClaimReport:
         tuple(map(_claim, document["claims"])),
         tuple(map(_claim, document["timings"])),
         tuple({**each, "rows": [list(map(_cell, row)) for row in each["rows"]]} for each in document["tables"]),
-        tuple((figure["title"], _svg(path.parent / figure["file"])) for figure in document["figures"]),
+        tuple(
+            (figure["title"], read_within(path.parent / figure["file"], LARGEST).decode())
+            for figure in document["figures"]
+        ),
     )
 
 
@@ -86,13 +91,6 @@ def _cell(value: object) -> object:
 
 def _claim(claim: Json) -> Json:
     return {name: claim[name] for name in COLUMNS}
-
-
-def _svg(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise FormatError(str(path), f"can't be read: {error.strerror}") from None
 
 
 def _benchmark(name: str, part: Json) -> ClaimReport:
@@ -138,11 +136,9 @@ def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[Clai
     Raises:
         FormatError: If the directory can't hold them.
     """
-    try:
+    with written(out, "can't hold the results"):
         (out / DATA).write_text(to_json(papers, beyond), encoding="utf-8")
         (out / PAGE).write_text(render(papers, beyond), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise FormatError(str(out), f"can't hold the results: {error.strerror}") from None
     return out / PAGE
 
 

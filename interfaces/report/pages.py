@@ -39,7 +39,7 @@ def _templates() -> Environment:
     templates.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     templates.filters |= {
         "base64": lambda text: base64.b64encode(text.encode("utf-8")).decode("ascii"),
-        "figure": lambda value: "–" if value is None else number(value),
+        "figure": number,
         "interval_said": interval_said,
         "numeric": _numeric,
         "said": said,

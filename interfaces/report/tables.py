@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from vrs.ledger import Receipt
 
 if TYPE_CHECKING:
+    from rich.columns import Columns
     from rich.table import Table
 
 FIGURES: Final = (
@@ -35,15 +36,6 @@ def shown(value: float | None, scale: float, unit: str) -> str:
     return f"{scale * value:z.3f}" if unit else f"{value:z.0f}"
 
 
-Summary = dict[str, Any]
-ROWS = (
-    ("timeline_time", "timeline"),
-    ("lag_removed", "… no lag"),
-    ("user_time", "user"),
-    ("servo", "servo"),
-)
-
-
 def table_of(title: str, heads: Iterable[str], left: Collection[str]) -> Table:
     """An empty table for a terminal; columns with the heads `left` are set left, the others right."""
     from rich.table import Table
@@ -54,124 +46,41 @@ def table_of(title: str, heads: Iterable[str], left: Collection[str]) -> Table:
     return table
 
 
-def error_table(summary: Summary) -> Table:
-    """Joint and tool errors, a row a way of comparing."""
+def rich_tables(summary: Json) -> Iterator[Table | Columns]:
+    """The tables of `tiles` and `figures` but the last for a terminal; what they hold isn't markup."""
+    from rich.columns import Columns
+
     title = f"Virtual and real {summary['robot']}, delay {summary['delay']}, offset {summary['offset']}"
-    mixed = "joint_rms_m" in summary["errors"]["timeline_time"]
-    joints = ("rms", "max") if mixed else ("rms\ndeg", "max\ndeg")
-    tools = ("tool rms\nmm", "max\nmm", "angle\nrms deg", "max\ndeg")
-    table = table_of(title, ("at equal", "joint", *joints, *tools), left=("at equal",))
-    for key, label in ROWS:
-        row = summary["errors"][key]
-        joint = row["worst_joint"]
-        table.add_row(
-            label,
-            str(joint),
-            *(_of_joint(row, name, joint, mixed=mixed) for name in ("joint_rms", "joint_max")),
-            f"{1e3 * row['tool_rms_m']:.2f}",
-            f"{1e3 * row['tool_max_m']:.2f}",
-            f"{row['angle_rms_deg']:.3f}",
-            f"{row['angle_max_deg']:.3f}",
-        )
-    return table
+    gap = f"{NOT_MEASURED} ({_with_unit(summary['gap_s'], 's')})" if summary["gap_s"] > 0 else ""
+    short: Sheet = (title, ("", ""), [(label, value) for value, label in tiles(summary)], gap, True)
+    narrow = []
+    for name, heads, rows, note, wide in (short, *figures(summary)[:-1]):
+        table = table_of(name, heads, left=heads[:1])
+        table.columns[0].no_wrap = True
+        table.show_header, table.caption, table.caption_justify = any(heads), note or None, "left"
+        for row in rows:
+            table.add_row(*map(number, row))
+        if wide:
+            yield table
+        else:
+            narrow.append(table)
+    yield Columns(narrow)
 
 
-def _of_joint(row: Summary, name: str, joint: int, *, mixed: bool) -> str:
-    """A figure of a joint, counted from 1, with its unit where joints have different ones."""
-    angle = row[f"{name}_deg"][joint - 1]
-    if angle is None:
-        return f"{1e3 * row[f'{name}_m'][joint - 1]:.2f} mm"
-    return f"{angle:.3f} deg" if mixed else f"{angle:.3f}"
-
-
-def attribution_table(summary: Summary) -> Table:
-    """Errors split among their causes, a row a measure."""
-    order = summary["attribution_order"]
-    causes = [cause.replace("_", " ") for cause in order]
-    heads = ("measure (rms)", "total", *causes, "residual")
-    table = table_of(f"Why: switched off in turn, {', '.join(causes)}", heads, left=("measure (rms)",))
-    for item in summary["attribution"]:
-        label, scale, unit = MEASURES[item["measure"]]
-        values = [item["total"], *(item["parts"][cause] for cause in order), item["residual"]]
-        table.add_row(f"{label}, {unit}", *(f"{round(scale * value, 3) + 0.0:.3f}" for value in values))
-    return table
-
-
-def offset_table(summary: Summary) -> Table:
-    """What other choices of the offset make of the same network."""
-    table = table_of("The same network, a body that follows exactly", OFFSETS, left=("offset",))
-    for row in offset_rows(summary):
-        table.add_row(*(f"{value:.3f}" if isinstance(value, float) else str(value) for value in row))
-    return table
-
-
-def offset_rows(summary: Summary) -> list[tuple[str | float, ...]]:
-    """Cells below the heads of OFFSETS."""
-    return [
-        (
-            row["offset"],
-            float(row["behind_mean_s"]),
-            float(row["behind_max_s"]),
-            row["late"],
-            row["waits"],
-            1e3 * row["tool_rms_timeline_m"],
-        )
-        for row in summary["offsets"]
-    ]
-
-
-OFFSETS = ("offset", "behind, mean [s]", "at most [s]", "commands late", "waits", "tool rms [mm]")
+OFFSETS: Final = {
+    "offset": "offset",
+    "behind_mean_s": "behind, mean [s]",
+    "behind_max_s": "at most [s]",
+    "late": "commands late",
+    "waits": "waits",
+    "tool_rms_timeline_m": "tool rms [mm]",
+}
+"""Figures of an outcome, and their heads."""
 MEASURES = {
     "tool_rms_timeline_m": ("tool, timeline", 1e3, "mm"),
     "tool_rms_user_m": ("tool, user time", 1e3, "mm"),
     "joint_rms_timeline_rad": ("joints, timeline", 57.29577951308232, "deg"),
 }
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
-
-
-def time_lines(summary: Summary) -> list[str]:
-    """Time difference, path error and what became of the commands, a sentence each."""
-    path, commands, behind = summary["path"], summary["commands"], summary["behind"]
-    lag = summary["lag_timeline_s"]
-    control = "a robot that stands has no lag" if lag is None else f"its joints lag another {_seconds(lag)}"
-    lines = [
-        f"Network: the robot played {_seconds(behind['mean_s'])} behind the operator on average, at most "
-        f"{_seconds(behind['max_s'])} (offset {summary['offset']}); it slowed down {_times(behind['slowed'])} and "
-        f"waited {_times(behind['waited'])}. Control: {control}.",
-        f"Time difference along the tool path: mean {_seconds(path['time_difference_mean'])}, "
-        f"sd {_seconds(path['time_difference_sd'])}, max {_seconds(path['time_difference_max'])}.",
-        f"Tool path error: mean {_millimetres(path['path_error_mean'])}, "
-        f"95 % {_millimetres(path['path_error_p95'])}, max {_millimetres(path['path_error_max'])}.",
-        f"Commands at the virtual robot: {_counts(commands['virtual'])}; at the real one: "
-        f"{_counts(commands['real'])}; {commands['sent']} sent, {commands['lost']} lost, "
-        f"{commands['late']} late; the virtual robot was corrected {_times(commands['corrections'])}.",
-    ]
-    if summary["gap_s"] > 0:
-        lines.append(
-            f"Of the {summary['duration_s']:.1f} s, the real robot wasn't measured for {summary['gap_s']:.1f} s: "
-            "nothing then is in any figure."
-        )
-    if path["progress"] is not None and path["progress"] < 0.97:
-        lines.append(
-            f"The real robot reached {path['progress']:.1%} of the path: the means above don't compare; "
-            f"the time difference is at least {_seconds(path['time_difference_bound'])}."
-        )
-    return lines
-
-
-def _seconds(value: float | None) -> str:
-    return "undefined" if value is None else f"{value:.3f} s"
-
-
-def _millimetres(value: float | None) -> str:
-    return "undefined" if value is None else f"{1e3 * value:.2f} mm"
-
-
-def _counts(counts: dict[str, int]) -> str:
-    return ", ".join(f"{number} {status}" for status, number in counts.items())
 
 
 Json = Mapping[str, Any]
@@ -211,6 +120,10 @@ COMPARISONS: Final = {
     "servo": "real against its reference",
 }
 """Heads of the error table."""
+WHOLE: Final = 0.97
+"""A real robot that got less far along the path didn't reach its end."""
+ENDED_SHORT: Final = "The real robot didn't reach the end of the path: the means don't compare."
+NOT_MEASURED: Final = "What happened while the real robot wasn't measured is in no figure."
 SUFFIXES: Final = {"_deg": "deg", "_rad": "rad", "_m": "mm", "_s": "s"}
 SCALES: Final = {"mm": 1e3, "%": 100.0}
 
@@ -254,15 +167,18 @@ def figures(summary: Json) -> list[Sheet]:
             "adaptive one slows the robot down along the committed path. The body follows exactly here, so that "
             "what is left is the network's."
         )
-        out.append(("What the choice of the offset does", OFFSETS, offset_rows({"offsets": offsets}), note, True))
+        rows = [[_scaled(each[name], "mm" if name.endswith("_m") else "") for name in OFFSETS] for each in offsets]
+        out.append(("What the choice of the offset does", tuple(OFFSETS.values()), rows, note, True))
     if path := _part(summary, "path"):
-        rows = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
-        out.append(("Tool path and time difference, user time", ("", ""), rows, "", False))
+        note = "" if (path.get("progress") or 1.0) >= WHOLE else ENDED_SHORT
+        pairs = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
+        out.append(("Tool path and time difference, user time", ("", ""), pairs, note, False))
     if commands := _part(summary, "commands"):
         out.append(("Commands", ("", ""), _flat(commands), "", False))
     rest = {name: value for name, value in summary.items() if name not in ELSEWHERE}
     if rest:
-        out.append(("The run", ("", ""), _flat(rest), "", False))
+        note = NOT_MEASURED if rest.get("gap_s") else ""
+        out.append(("The run", ("", ""), _flat(rest), note, False))
     return out
 
 
@@ -353,7 +269,9 @@ def _with_unit(value: object, unit: str) -> str | None:
 
 
 def number(value: object) -> str:
-    """A figure's text: three digits behind the point, none from 10,000 on."""
+    """A figure's text: three digits behind the point, none from 10,000 on; a dash where it isn't defined."""
+    if value is None:
+        return "–"
     if isinstance(value, bool) or not isinstance(value, float):
         return str(value)
     return f"{value:.0f}" if abs(value) >= 1e4 else f"{round(value, 3) + 0.0:.3f}".replace("-", "−")

@@ -26,6 +26,7 @@ from interfaces.rsp.model.elements import (
     Sensor,
     stated,
 )
+from interfaces.system import written
 from vrs.errors import FormatError
 
 FILES: Final = ("__init__.py", "model.py", "packets.py", "local.py", "robot.py")
@@ -158,13 +159,11 @@ def write_package(model: RobotModel, directory: Path) -> Path:
     """
     files = package(model)
     target = directory / model.name
-    try:
+    with written(target, "can't hold the package"):
         target.mkdir(parents=True, exist_ok=True)
         strange = {path.name for path in target.iterdir()} - {*files, "__pycache__"}
         if strange:
             raise FormatError(str(target), f"holds {', '.join(sorted(strange)[:3])}, which isn't generated")
         for name, text in files.items():
             (target / name).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FormatError(str(target), f"can't hold the package: {error.strerror}") from None
     return target

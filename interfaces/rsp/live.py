@@ -8,7 +8,7 @@ import secrets
 import select
 import socket
 import threading
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -43,15 +43,7 @@ class UdpLink:
             FormatError: If it can't be resolved.
         """
         where = parse_address("robot", address)
-        try:
-            family, kind, protocol, _, target = socket.getaddrinfo(where.host, where.port, type=socket.SOCK_DGRAM)[
-                0
-            ]
-            self._socket = socket.socket(family, kind, protocol)
-            self._socket.connect(target)
-        except OSError as error:
-            raise FormatError(address, error.strerror or "no such address") from None
-        self._socket.setblocking(False)
+        self._socket = _udp(where.host, where.port, socket.socket.connect, address)
         self.middleware = middleware
         self._clock = clock
         self._wake, self._woken = socket.socketpair()
@@ -175,17 +167,21 @@ def bind(host: str, port: int) -> socket.socket:
     Raises:
         FormatError: If that can't be had.
     """
+    return _udp(host, port, socket.socket.bind, f"{host}:{port}")
+
+
+def _udp(host: str, port: int, use: Callable[[socket.socket, Any], None], where: str) -> socket.socket:
+    """A UDP socket that doesn't block, connected or bound to an address, which is called so in errors."""
+    made = None
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         made = socket.socket(family, kind, protocol)
-    except OSError as error:
-        raise FormatError(f"{host}:{port}", error.strerror or "no such address") from None
-    try:
         made.setblocking(False)
-        made.bind(address)
+        use(made, address)
     except OSError as error:
-        made.close()
-        raise FormatError(f"{host}:{port}", error.strerror or "can't be listened on") from None
+        if made is not None:
+            made.close()
+        raise FormatError(where, error.strerror or "no such address") from None
     return made
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from collections.abc import Set
+from collections.abc import Callable, Set
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
+
+from typing_extensions import override
 
 from interfaces.rsp.errors import FullError
 from interfaces.rsp.header import LONGEST, MODULUS, up_to
@@ -83,12 +85,11 @@ class _Item:
     """Number of the first packet that had it; −1 before there was one."""
 
 
-class CommandOutbox:
-    """Commands in one order: as many under way as fit into a packet, each in every packet until it's acknowledged.
+class _Outbox:
+    """Items in one order that must arrive: some wait, the others are under way."""
 
-    An acknowledgement is the last received number: since the command is in every packet from the first one on, a
-    number from there on says that it came.
-    """
+    what: ClassVar[str]
+    """What there are too many of, in the error."""
 
     def __init__(self) -> None:
         """Begin empty."""
@@ -97,8 +98,46 @@ class CommandOutbox:
         self._next = 0
 
     def __len__(self) -> int:
-        """Commands that aren't acknowledged."""
+        """Items that aren't settled."""
         return len(self._waiting) + len(self._flying)
+
+    def _add(self, index: int, payload: Callable[[int], bytes], deadline: float = math.inf) -> int:
+        """Take an item, its payload made of the ID on the wire; returns its ID.
+
+        Raises:
+            FullError: If too many wait.
+        """
+        if len(self) >= MOST_WAITING:
+            raise FullError(f"the queue of {self.what}", MOST_WAITING)
+        number, self._next = self._next, self._next + 1
+        self._waiting.append(_Item(index, number, payload(number % MODULUS), deadline))
+        return number
+
+    def _settle(self, over: Callable[[_Item], bool], outcome: DeliveryOutcome) -> list[Settled]:
+        """Let go of what is over."""
+        found = [item for item in (*self._flying, *self._waiting) if over(item)]
+        if found:
+            self._flying = [item for item in self._flying if not over(item)]
+            self._waiting = deque(item for item in self._waiting if not over(item))
+        return [Settled(item.index, item.id, outcome) for item in found]
+
+    def expire(self, now: float) -> list[Settled]:
+        """Give up what has passed its deadline by now [s]."""
+        return self._settle(lambda item: item.deadline <= now, DeliveryOutcome.FAILED)
+
+    def drain(self) -> list[Settled]:
+        """Give up all."""
+        return self.expire(math.inf)
+
+
+class CommandOutbox(_Outbox):
+    """Commands in one order: as many under way as fit into a packet, each in every packet until it's acknowledged.
+
+    An acknowledgement is the last received number: since the command is in every packet from the first one on, a
+    number from there on says that it came.
+    """
+
+    what = "commands"
 
     def put(self, index: int, values: bytes) -> int:
         """Take a command for an element; returns its ID.
@@ -106,11 +145,7 @@ class CommandOutbox:
         Raises:
             FullError: If too many wait.
         """
-        if len(self) >= MOST_WAITING:
-            raise FullError("the queue of commands", MOST_WAITING)
-        number, self._next = self._next, self._next + 1
-        self._waiting.append(_Item(index, number, ID.pack(number % MODULUS) + values))
-        return number
+        return self._add(index, lambda number: ID.pack(number) + values)
 
     def fill(self, payloads: dict[int, bytes], packet: int) -> None:
         """Add what goes into a packet of a number."""
@@ -121,44 +156,32 @@ class CommandOutbox:
             item.first = packet
             taken.add(item.index)
             self._flying.append(item)
-        for item in self._flying:
-            payloads[item.index] = item.payload
-
-    def drain(self) -> list[Settled]:
-        """Give up all."""
-        left, self._flying, self._waiting = [*self._flying, *self._waiting], [], deque()
-        return [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in left]
+        payloads |= {item.index: item.payload for item in self._flying}
 
     def acknowledge(self, last: int) -> list[Settled]:
         """Take the other side's last received number."""
-        done = [item for item in self._flying if item.first <= last]
-        if done:
-            self._flying = [item for item in self._flying if item.first > last]
-        return [Settled(item.index, item.id, DeliveryOutcome.DONE) for item in done]
+        return self._settle(lambda item: 0 <= item.first <= last, DeliveryOutcome.DONE)
 
 
-class MemoryOutbox:
+class MemoryOutbox(_Outbox):
     """Memory items in one order: a flight of them is sent once, again where no acknowledgement comes, or given up.
 
     What follows a flight waits until all of it is acknowledged or given up, so that nothing can come out of order.
     """
 
+    what = "memory items"
+
+    @override
     def __init__(self, room: int = LONGEST) -> None:
         """Begin empty.
 
         Args:
             room: For a flight in a packet [byte]; for one item at least.
         """
+        super().__init__()
         self._room = room
-        self._waiting: deque[_Item] = deque()
-        self._flight: list[_Item] = []
-        self._next = 0
         self._due = -math.inf
         self._tries = 0
-
-    def __len__(self) -> int:
-        """Items that aren't settled."""
-        return len(self._waiting) + len(self._flight)
 
     def put(self, index: int, data: bytes, deadline: float) -> int:
         """Take an item for an element, to be settled by a time [s]; returns its ID.
@@ -166,12 +189,7 @@ class MemoryOutbox:
         Raises:
             FullError: If too many wait.
         """
-        if len(self) >= MOST_WAITING:
-            raise FullError("the queue of memory items", MOST_WAITING)
-        number, self._next = self._next, self._next + 1
-        payload = STORED.pack(number % MODULUS, len(data)) + data
-        self._waiting.append(_Item(index, number, payload, deadline))
-        return number
+        return self._add(index, lambda number: STORED.pack(number, len(data)) + data, deadline)
 
     def fill(self, payloads: dict[int, bytes], *, now: float, timeout: float) -> None:
         """Add what goes into a packet now.
@@ -181,41 +199,26 @@ class MemoryOutbox:
             now: [s].
             timeout: After so long without an acknowledgement it's sent again [s]; twice as long after each time.
         """
-        if not self._flight:
+        if not self._flying:
             taken: set[int] = set()
             room = self._room
             while self._waiting and self._waiting[0].index not in taken and len(self._waiting[0].payload) <= room:
                 item = self._waiting.popleft()
                 taken.add(item.index)
                 room -= len(item.payload)
-                self._flight.append(item)
+                self._flying.append(item)
             self._due, self._tries = now, 0
-        if self._flight and now >= self._due:
-            for item in self._flight:
-                payloads[item.index] = item.payload
+        if self._flying and now >= self._due:
+            payloads |= {item.index: item.payload for item in self._flying}
             self._due = now + timeout * 2.0 ** min(self._tries, 3)
             self._tries += 1
 
     def acknowledge(self, index: int, payload: bytes) -> list[Settled]:
         """Take an acknowledgement of an element: all of its items up to an ID came."""
-        if not self._flight:
+        if not self._flying:
             return []
-        upto = up_to(ID.unpack(payload)[0], self._flight[-1].id)
-        done = [item for item in self._flight if item.index == index and item.id <= upto]
-        self._flight = [item for item in self._flight if item not in done]
-        return [Settled(item.index, item.id, DeliveryOutcome.DONE) for item in done]
-
-    def drain(self) -> list[Settled]:
-        """Give up all."""
-        return self.expire(math.inf)
-
-    def expire(self, now: float) -> list[Settled]:
-        """Give up what has passed its deadline by now [s]."""
-        late = [item for item in (*self._flight, *self._waiting) if item.deadline <= now]
-        if late:
-            self._flight = [item for item in self._flight if item.deadline > now]
-            self._waiting = deque(item for item in self._waiting if item.deadline > now)
-        return [Settled(item.index, item.id, DeliveryOutcome.FAILED) for item in late]
+        upto = up_to(ID.unpack(payload)[0], self._flying[-1].id)
+        return self._settle(lambda item: item.index == index and item.id <= upto, DeliveryOutcome.DONE)
 
 
 class MemoryInbox:

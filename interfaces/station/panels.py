@@ -33,8 +33,8 @@ class Offer(StrEnum):
 class Panel:
     """A part of the page.
 
-    Its script is `static/NAME.js`, a module that exports `mount(station, box)`, called with the panel's own
-    element, which nobody else fills.
+    Its script is `static/NAME.js`, a module that exports the component `Panel`; or, before it's made one, `mount(station,
+    box)`, which is called with the panel's own element.
     """
 
     name: str
@@ -59,6 +59,7 @@ PANELS: Final[tuple[Panel, ...]] = (
     Panel("link", "Connection", "header"),
     Panel("control", "Control", "header"),
     Panel("theme", "Light or dark", "header"),
+    Panel("hints", "Hints", "header"),
     Panel("stop", "Stop", "header"),
     Panel("jog", "Jog", "side", icon="open_with", of=Offer.POLYNOMIALS),
     Panel("drive", "Drive", "side", icon="gamepad", of=Offer.ARCS),
@@ -71,7 +72,6 @@ PANELS: Final[tuple[Panel, ...]] = (
     Panel("network", "Link", "side", icon="network_check"),
     Panel("record", "Record", "side", icon="fiber_manual_record", of=Offer.RECORDINGS),
     Panel("strip", "Timeline", "strip", of=Offer.POLYNOMIALS),
-    Panel("hints", "Hints", "nowhere"),
 )
 """What pages may have, in the order of their tabs and of the keyboard."""
 

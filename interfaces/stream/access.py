@@ -13,6 +13,7 @@ from pathlib import Path
 
 from interfaces.link.proxy import Address
 from interfaces.messages.control import Role, covers
+from interfaces.stream.invitations import Invitations
 from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32
@@ -35,12 +36,19 @@ class Access:
     The token of an admin also opens the roles of an operator and a viewer, that of an operator a viewer's.
     """
 
-    def __init__(self, tokens: Mapping[Role, str] | None = None, *, free: Iterable[Role] = OPEN) -> None:
+    def __init__(
+        self,
+        tokens: Mapping[Role, str] | None = None,
+        *,
+        free: Iterable[Role] = OPEN,
+        invitations: Invitations | None = None,
+    ) -> None:
         """Give each role its token.
 
         Args:
             tokens: Text by role; a role without a token is open only if `free` says so.
             free: Roles that need no token. With tokens for other machines this is empty.
+            invitations: Codes by which a class comes in; None where there's no class.
 
         Raises:
             InvalidValueError: If a token is shorter than 32 random bytes are, or the admin's role is free.
@@ -53,6 +61,7 @@ class Access:
         if Role.ADMIN in self._free:
             raise InvalidValueError("free", "admin", "roles other than admin")
         self._digests = {Role(role): _digest(token) for role, token in tokens.items()}
+        self.invitations = invitations
 
     def __repr__(self) -> str:
         roles = ", ".join(sorted(self._digests))
@@ -77,6 +86,8 @@ class Access:
         for owner, digest in self._digests.items():
             same = hmac.compare_digest(digest, shown)
             entitled |= same and covers(owner, role)
+        member = None if self.invitations is None else self.invitations.member(token)
+        entitled |= member is not None and covers(member.role, role)
         if entitled or (token is None and role in self._free):
             return ""
         return f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"

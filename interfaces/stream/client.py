@@ -49,11 +49,11 @@ UNKNOWN = "unknown: the session was lost before an answer came"
 _FATAL = frozenset({ProblemCode.REFUSED, ProblemCode.VERSION, ProblemCode.HELLO_EXPECTED})
 """Problems that a new connection would meet again."""
 
-Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder | control.PathCorrection
+Asked: TypeAlias = control.LeaseWish | Survey | Impair | TaskOrder | control.PathCorrection | control.Who
 """What a client may wish for."""
 Ask: TypeAlias = Callable[[int], Asked]
 """Makes a wish of its number."""
-Replied: TypeAlias = control.Lease | control.Problem | control.Corrected | Network | Tasks
+Replied: TypeAlias = control.Lease | control.Problem | control.Corrected | Network | Tasks | control.Present
 """What answers one."""
 
 _COMING = Reply | Notice | Welcomed | News
@@ -226,7 +226,7 @@ class ClientCore:
             self._settle(message.number, message)
         elif isinstance(message, News):
             self.newest[type(message)] = message
-            if isinstance(message, Network | Tasks):
+            if isinstance(message, Network | Tasks | control.Present):
                 self._settle(message.answers, message)
         else:
             self._hand_on(message, now)  # type: ignore[arg-type]

@@ -37,7 +37,7 @@ LARGEST = 65_536
 
 Welcomed: TypeAlias = control.Welcome | MobileWelcome
 """What greets a client: of an arm's server, of a mobile robot's."""
-News: TypeAlias = control.State | Postures | control.Network | Tasks | Seen | Plan
+News: TypeAlias = control.State | Postures | control.Network | Tasks | Seen | Plan | control.Present
 """What is told of the robot and the way to it: of each kind the newest counts."""
 Value: TypeAlias = (
     Request | Reply | Question | Notice | Welcomed | Postures | TaskOrder | News

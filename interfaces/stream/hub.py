@@ -26,17 +26,21 @@ from interfaces.messages.control import (
     Ping,
     Pong,
     Postures,
+    Present,
     Problem,
     ProblemCode,
     ProtocolError,
     Role,
     Survey,
+    Who,
+    covers,
     may_send,
 )
 from interfaces.messages.jobs import RobotTask, TaskOrder, Tasks
 from interfaces.stream.access import Access
 from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
-from interfaces.stream.leasing import LeasedRobot, Leasing, SessionState, Wish
+from interfaces.stream.invitations import Membership, is_code
+from interfaces.stream.leasing import Classroom, LeasedRobot, Leasing, SessionState, Wish
 from interfaces.stream.limits import Allowance, Allowances, Bucket, ClientLimits, Outbox
 from robots.onboard.lease import Lease, LeaseState
 from vrs.errors import InvalidValueError, VrsError
@@ -47,6 +51,8 @@ POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
+PRESENCE = 0.2
+"""At most so often are clients told who is here [s]."""
 SURVEYED = 0.1
 """How old what is told of the way to the robot may be [s]."""
 CHANGES = 5.0
@@ -175,6 +181,8 @@ class HubSession:
         """Version of the lease that the client knows."""
         self._network: int | None = None
         """The same of the way to the robot; None while it hasn't asked."""
+        self._present: int | None = None
+        """The same of who is here."""
         self._news = 0
         """The same of what all are told."""
 
@@ -256,12 +264,25 @@ class HubSession:
                 self._lease = self.hub.leasing.version
             if answer is not None:
                 self.outbox.put(answer)
+        elif isinstance(message, Who):
+            self._say_who(message, now)
         elif isinstance(message, Survey | Impair):
             self._survey(seat, message, now)
         elif isinstance(message, TaskOrder):
             self.outbox.put(self.hub.task(seat, message, now))
         elif isinstance(message, PathCorrection):
             self.outbox.put(self.hub.correct(seat, message, now))
+
+    def _say_who(self, message: Who, now: float) -> None:
+        """Tell who is here, and from now on when that changes."""
+        hub = self.hub
+        if hub.leasing.classroom is None:
+            text = "there's no class here: nobody asks who it is"
+            self.outbox.put(Problem(ProblemCode.NOT_ALLOWED, text, message.number))
+            return
+        hub.note_present(now)
+        self._present = hub.present_version
+        self.outbox.put(msgspec.structs.replace(hub.present, answers=message.number))
 
     def _survey(self, seat: SessionState, message: Survey | Impair, now: float) -> None:
         """Tell how the way to the robot is, after it was changed where that was asked for."""
@@ -277,7 +298,8 @@ class HubSession:
     def _greet(self, hello: control.Hello, now: float) -> None:
         found = self.hub.greet(self, hello, now)
         if isinstance(found, Problem):
-            self.close(TRY_AGAIN if found.code is ProblemCode.FULL else POLICY, found.code, found.text)
+            later = found.code in {ProblemCode.FULL, ProblemCode.TOO_FAST}
+            self.close(TRY_AGAIN if later else POLICY, found.code, found.text)
             return
         self.seat, welcome = found
         self._lease = self.hub.leasing.version
@@ -326,6 +348,8 @@ class HubSession:
             return True
         if self._network is not None and hub.network_version != self._network:
             return True
+        if self._present is not None and hub.present_version != self._present:
+            return True
         t = self.seat.servlet.next_deadline()
         return t is not None and t <= hub.engine_time(now)
 
@@ -358,6 +382,9 @@ class HubSession:
             found = hub.network(now)
             if found is not None:
                 self.outbox.put_newest(found)
+        if self._present is not None and hub.present_version != self._present:
+            self._present = hub.present_version
+            self.outbox.put_newest(hub.present)
         if hub.news_version != self._news:
             for version, news in hub.news.values():
                 if version > self._news:
@@ -431,8 +458,14 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        self.leasing = Leasing(lease, robot, self.limits.sharers)
+        classroom = None if access.invitations is None else Classroom()
+        self.leasing = Leasing(lease, robot, self.limits.sharers, classroom)
         """Who may command."""
+        self.present = Present()
+        """Who is here of a class, as its clients are told."""
+        self.present_version = 0
+        """Counts its changes."""
+        self._present_of, self._present_due = (0, 0), -math.inf
         self._random = random_bytes
         if not site.broadcasters:
             for rate in self.config.rates:
@@ -529,7 +562,9 @@ class Hub:
             return
         del self._served[seat]
         seat.left = now
-        if done or seat.role is Role.VIEWER:
+        self.leasing.note(seat, here=False)
+        # In a class, who loads the page again keeps its place in the queue.
+        if (done and not seat.member) or seat.role is Role.VIEWER:
             self._forget(seat)
         self._tidy(now)
 
@@ -573,6 +608,7 @@ class Hub:
         if self._shown is not None and now >= self._state_due:
             self.tell(self._shown)
             self._shown, self._state_due = None, now + 1.0 / self.config.state_rate
+        self.note_present(now)
         edit, before = self.site.look(), self._edit
         self._edit = edit
         if edit != before:
@@ -581,6 +617,15 @@ class Hub:
         if len(self._seats) > len(self._sessions):
             self._tidy(now)
         return tuple(session for session in self._sessions if session.is_due(now))
+
+    def note_present(self, now: float) -> None:
+        """Note who is here of a class, where that has changed; not too often, however many ask."""
+        room = self.leasing.classroom
+        if room is None or now < self._present_due or self._present_of == (self.leasing.version, room.version):
+            return
+        self._present_of, self._present_due = (self.leasing.version, room.version), now + PRESENCE
+        self.present = self.leasing.present()
+        self.present_version += 1
 
     def next_deadline(self) -> float | None:
         """When to call `advance` next [s]; None for not before something arrives."""
@@ -599,24 +644,45 @@ class Hub:
         """Let a client in, or say why not; see `HubSession`."""
         if hello.protocol != PROTOCOL:
             return Problem(ProblemCode.VERSION, f"this server speaks version {PROTOCOL} of the protocol")
-        refusal = self.access.refusal(hello.role, hello.token)
-        if not refusal and hello.role not in _SERVED:
-            refusal = f"nothing is here for the role {hello.role}"
+        member = self._member(hello, self._opened[session], now)
+        if isinstance(member, Problem):
+            return member
+        role = hello.role if member is None or covers(member.role, hello.role) else member.role
+        refusal = "" if member is not None else self.access.refusal(role, hello.token)
+        if not refusal and role not in _SERVED:
+            refusal = f"nothing is here for the role {role}"
         if refusal:
             return Problem(ProblemCode.REFUSED, refusal)
         seat = self._seats.get(hello.session or "")
-        resumed = seat is not None and seat.role is hello.role
+        resumed = seat is not None and seat.role is role
         if seat is None or not resumed:
-            if full := self._full(hello.role):
+            if full := self._full(role):
                 return Problem(ProblemCode.FULL, full)
-            seat = self._seat(hello.name, hello.role)
+            seat = self._seat(hello.name, role)
             self._seats[seat.key] = seat
+            self.leasing.enter(seat)
         elif (before := self._served.get(seat)) is not None:
             before.close(POLICY, ProblemCode.REFUSED, "the session is continued by another connection")
             before.seat = None
-        welcome = self._welcome(seat, resumed, now)
+        if member is not None and self.access.invitations is not None:
+            self.access.invitations.remember(seat.key, member)
         self._served[seat] = session
-        return seat, welcome
+        self.leasing.note(seat, here=True)
+        return seat, self._welcome(seat, resumed, now)
+
+    def _member(self, hello: control.Hello, address: str, now: float) -> Membership | Problem | None:
+        """What a code gives to a client of a class, now or before; None of who shows none."""
+        invitations = self.access.invitations
+        if invitations is None:
+            return None
+        known = invitations.member(hello.session) or invitations.member(hello.token)
+        if hello.token is None or not is_code(hello.token):
+            return known
+        if not invitations.may_try(address, now=now):
+            text = "too many codes were tried: wait some seconds, and try again"
+            return known or Problem(ProblemCode.TOO_FAST, text)
+        text = "this code doesn't count, or not any more: take the one that's shown now"
+        return invitations.redeem(hello.token, now=now) or known or Problem(ProblemCode.REFUSED, text)
 
     def _full(self, role: Role) -> str:
         """Why there's no place for one more; empty if there is. Who goes on with a session has its place."""

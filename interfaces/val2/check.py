@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from interfaces.val2 import forms
 from interfaces.val2.compiler import compiled_step
-from interfaces.val2.context import CHANNELS, MOST_PERCENT, TASKS, TIMERS
+from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.expressions import WANTED, Closure, kind_of
@@ -21,7 +21,8 @@ from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
-from interfaces.val2.signals import legal, settable
+from interfaces.val2.rows import NUMBERS
+from interfaces.val2.signals import HIGHEST, legal, settable
 from interfaces.val2.source import SourceFile, read_all, says_dialect
 from interfaces.val2.structure import Structure, StructureBlock, survey
 from interfaces.val2.syntax import (
@@ -188,10 +189,13 @@ class _Checker(ProgramCompiler):
         if i.passed is not None and i.keyword not in forms.UNAVAILABLE:
             detail = f"{i.keyword} {i.passed}".rstrip() + " is passed over"
             self._warnings.append(ValError("No meaning here", detail, place=i.at))
-        self._errors += [*self._names.wrong_calls(i), *_set_parameter(i)]
+        self._errors += self._names.wrong_calls(i)
         before = len(self._errors)
         try:
             compiled_step(self, n, i)
+            match i:
+                case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
+                    forms.PARAMETERS[name].require(value, "Value out of range", operand.at)
         except ValError as error:
             if len(self._errors) == before:
                 self._errors.append(error.at(place=i.at))
@@ -242,16 +246,6 @@ def _passed(argument: Expression, parameter: Variable) -> Iterator[ValError]:
     wanted = {"$": "string", "#": "point"}.get(parameter.prefix)
     if kind and (kind != wanted if wanted else kind in ("string", "point")):
         yield ValError("Mixed types", f"an argument for {parameter.name}", place=argument.at)
-
-
-def _set_parameter(statement: Instruction) -> Iterator[ValError]:
-    """A number that a parameter can't be."""
-    match statement:
-        case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
-            row = forms.PARAMETERS[name]
-            if not row.low <= value <= row.high:
-                allowed = f"{row.low:g} to {row.high:g} {row.unit}"
-                yield ValError("Value out of range", f"allowed: {allowed}", place=operand.at)
 
 
 def _alike_names(text: str) -> Iterator[CheckFinding]:
@@ -362,14 +356,12 @@ def _range(low: float, high: float, allowed: str) -> Callable[[float], None]:
 _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "signal": legal,
     "output": settable,
-    "joint": _range(1, 6, "a joint, 1 to 6"),
     "seconds": _range(0, 1e6, "seconds, not negative"),
     "time": _range(0, 1e9, "seconds, not negative"),
     "speed": _range(1e-3, 1e6, "a speed above 0"),
     "mode": _range(0, 3, "a mode, 0 to 3"),
-    "task": _range(TASKS[0], TASKS[-1], f"a task, {TASKS[0]} to {TASKS[-1]}"),
-    "channel": _range(CHANNELS[0], CHANNELS[-1], f"a channel, {CHANNELS[0]} to {CHANNELS[-1]}"),
-    "timer": _range(TIMERS[0], TIMERS[-1], f"a timer, {TIMERS[0]} to {TIMERS[-1]}"),
+    "priority": _range(1, HIGHEST, f"a priority, 1 to {HIGHEST:g}"),
+    **{what: _range(n[0], n[-1], f"a {what}, {n[0]} to {n[-1]}") for what, n in NUMBERS.items()},
 }
 """What numbers that are written down have to be."""
 _STANDING: Final = ("HERE", "DEST")

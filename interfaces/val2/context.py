@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol, TypeAlias
 from interfaces.val2.errors import NOWHERE, TextPosition, ValError
 from interfaces.val2.memory import Memory, Slots, VariableSlot
 from interfaces.val2.motion.arm import Arm
-from interfaces.val2.rows import PARAMETERS, SWITCHES
+from interfaces.val2.rows import CHANNELS, PARAMETERS, SWITCHES, TIMERS
 from interfaces.val2.signals import Reactions, Signals
 from interfaces.val2.syntax import Program
 from interfaces.val2.units import Units
@@ -128,9 +128,6 @@ SPECIAL: Final = -1
 EXTRA_STEP_COST: Final = 9
 MOST_PERCENT: Final = 100.0
 """Of speeds and accelerations: more counts as this."""
-TIMERS: Final = range(16)
-CHANNELS: Final = range(1, 33)
-"""Of analogue inputs and outputs, and of ports, each."""
 SLICE: Final = 0.016
 """How often a wait looks at what changes with time alone [s]: V+'s cycle."""
 
@@ -182,8 +179,6 @@ class ProgramState(Enum):
     """It can go on: after PAUSE, ABORT, a single step or an error."""
 
 
-TASKS: Final = range(28)
-"""Programs that may run beside each other. Task 0 is the main one, which has the arm as it begins."""
 PROCESS_CONTROL: Final = 1
 """The task of VAL-II's process control program."""
 
@@ -201,6 +196,8 @@ class RunningTask(Protocol):
     """Why it paused or ended."""
     cycles: int
     reactions: Reactions
+    error: ValError | None
+    """The last one: what REACTE's program reacts to."""
 
     @property
     def program(self) -> str:
@@ -255,6 +252,8 @@ class Context(ABC):
     pending: Action = 0
     stop_first: bool = False
     """Whether the next motion begins at rest: a configuration was asked for."""
+    due: bool = False
+    """Whether something that waits is to be looked at again."""
     extra_steps: int = 0
     """Steps for which a dear one stands in addition."""
     dropped: int = 0
@@ -317,22 +316,6 @@ class Context(ABC):
         if value > most:
             self.warn(Warned(f"{word} {value:.9g} {unit} counts as {most:.9g} {unit}"))
 
-    def timer(self, number: float) -> int:
-        """The index of a timer.
-
-        Raises:
-            ValError: If there's no such timer.
-        """
-        return _one_of("timer", number, TIMERS)
-
-    def channel(self, number: float) -> int:
-        """The number of a channel.
-
-        Raises:
-            ValError: If there's no such channel.
-        """
-        return _one_of("channel", number, CHANNELS)
-
     def switch(self, name: str, on: bool) -> None:
         """ENABLE or DISABLE.
 
@@ -355,9 +338,7 @@ class Context(ABC):
         """
         if name not in self.parameters or name not in PARAMETERS:
             raise ValError("Unknown parameter", f"{name}: one of {', '.join(sorted(self.parameters))}")
-        least, most = PARAMETERS[name].low, PARAMETERS[name].high
-        if not least <= value <= most:
-            raise ValError("Illegal value", f"{name} {value:.9g}: {least:g} to {most:g}")
+        PARAMETERS[name].require(value)
         self.parameters[name] = value
 
     def brake(self) -> None:
@@ -385,34 +366,53 @@ class Context(ABC):
             if task.robot:
                 self.arm.brake(now=self.now)
 
-    def resume_task(self, number: int, *, again: bool, single: bool = False) -> None:
-        """PROCEED, RETRY, XSTEP: a task that stands goes on, with its next step or the one that was given up.
+    def come(self, now: float | None) -> None:
+        """Let time come to now [s], if it's said, and look after what waits."""
+        self.now, self.due = self.now if now is None else max(now, self.now), True
+
+    def proceed(
+        self, number: int = 0, *, again: bool = False, single: bool = False, now: float | None = None
+    ) -> None:
+        """PROCEED, RETRY, XSTEP: a task that stands goes on.
+
+        Args:
+            number: The task.
+            again: Whether with the step that was given up, and the motion; else with the next one.
+            single: Whether it pauses after that step.
+            now: Session time [s].
 
         Raises:
             ValError: If it doesn't stand, or wants the arm, and another has it.
         """
-        task = self.standing_task(number)
+        self.come(now)
+        task = self._standing_task(number)
         self.require_free_arm(task)
         if again and task.robot:
             self.arm.retry(now=self.now)
         task.go_on(again=again, single=single)
 
-    def kill_task(self, number: int) -> None:
-        """KILL: a task that stands can't go on any more."""
-        self.standing_task(number).end("KILL")
+    def kill(self, number: int = 0, *, now: float | None = None) -> None:
+        """KILL: a task that stands can't go on any more.
 
-    def finish_task(self, number: int) -> None:
+        Raises:
+            ValError: If it doesn't stand.
+        """
+        self.come(now)
+        self._standing_task(number).end("KILL")
+
+    def finish(self, number: int = 0, *, now: float | None = None) -> None:
         """DONE, CYCLE.END: the present cycle of a task is its last.
 
         Raises:
             ValError: If it doesn't run.
         """
+        self.come(now)
         task = self.tasks.get(number)
         if task is None or task.state is not ProgramState.RUNNING:
             raise ValError("No program running", f"task {number}" if number else "")
         task.cycles = 1
 
-    def standing_task(self, number: int) -> RunningTask:
+    def _standing_task(self, number: int) -> RunningTask:
         """A task that stands.
 
         Raises:
@@ -422,14 +422,6 @@ class Context(ABC):
         if task is None or task.state is not ProgramState.PAUSED:
             raise ValError("No program to proceed", f"task {number}" if number else "")
         return task
-
-    def task_number(self, number: float) -> int:
-        """The number of a task.
-
-        Raises:
-            ValError: If there's no such task.
-        """
-        return _one_of("task", number, TASKS)
 
     def task_state(self, number: int) -> float:
         """TASK: 0 where nothing has run, 1 at an end, 2 after an error, 3 while it stands, 4 while it runs."""
@@ -473,14 +465,3 @@ class Context(ABC):
         """
         if not self.switches["POWER"]:
             raise ValError("Arm power off")
-
-
-def _one_of(what: str, number: float, numbers: range) -> int:
-    """A number as the index that it is.
-
-    Raises:
-        ValError: If it's none.
-    """
-    if number not in numbers:
-        raise ValError(f"Illegal {what} number", f"{number:.9g}: {numbers[0]} to {numbers[-1]}")
-    return int(number)

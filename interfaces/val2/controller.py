@@ -93,7 +93,6 @@ class Controller(Context):
         self.tasks: dict[int, Task] = {}
         self._do: Task | None = None
         self._busy = now
-        self._due = False
 
     @property
     def running(self) -> bool:
@@ -149,7 +148,7 @@ class Controller(Context):
         Raises:
             ValError: If one runs there, or this one is missing or not right.
         """
-        self.now = max(now, self.now)
+        self.come(now)
         self._require_idle(number)
         code = self.code(name)
         x = Expressions(self)
@@ -170,7 +169,8 @@ class Controller(Context):
             self.warned.clear()
             self.stop_first, self.path = False, (None, None)
             self.signals.begin(self.cell, values, now=self.now)
-        self.tasks[number], self._due = task, True
+        self.tasks[number] = task
+        self.come(None)
         return task
 
     def _condition(self, rule: SignalRule) -> Callable[[], bool]:
@@ -196,17 +196,16 @@ class Controller(Context):
             raise misplaced
         if self._do is not None or (self.running and not runs_beside_program(step)):
             raise ValError("Program already running")
-        self.now = max(now, self.now)
+        self.come(now)
         code = compiled(Program("", steps=(step,), dialect=self.dialect), self)
         if not self.running:
             self.warned.clear()
-            self._do, self._due = Task(self, code, [], cycles=1), True
+            self._do = Task(self, code, [], cycles=1)
             return
         try:
             code.steps[0](code.slots([]))
         except ValError as error:
             self.events.append(ProgramFailed(error))
-        self._due = True
 
     def release_scheduled(self, *, now: float) -> None:
         """End a DO whose motion is accepted but begins later, without waiting for it; else nothing."""
@@ -222,12 +221,11 @@ class Controller(Context):
         if scheduled:
             self._do.end(word)
             self._do = None
-            self._due = True
+            self.due = True
 
     def abort(self, number: int = 0, *, now: float) -> None:
         """ABORT: the arm brakes within its limits; a program stands, and can go on; a DO is over."""
-        self.now = max(now, self.now)
-        self._due = True
+        self.come(now)
         if number:
             self.abort_task(number)
         elif self._do is not None:
@@ -250,28 +248,13 @@ class Controller(Context):
 
         A DO is over. The arm isn't told to stop: somebody else does that, or has other plans.
         """
-        self.now = max(now, self.now)
+        self.come(now)
         task = self._do or next((t for t in self._active() if t.robot), None)
         if task is None:
             return
         task.fail(error)
         self._do = None
-        self._due = True
         self.arm.give_up(now=self.now)
-
-    def proceed(self, number: int = 0, *, single: bool = False, now: float) -> None:
-        """PROCEED, XSTEP: go on, with the next step where one was given up.
-
-        Args:
-            number: The task.
-            single: Whether it pauses after that step.
-            now: Session time [s].
-
-        Raises:
-            ValError: If there's nothing to go on with.
-        """
-        self._wake(number, now)
-        self.resume_task(number, again=False, single=single)
 
     def retry(self, number: int = 0, *, now: float) -> None:
         """RETRY: go on, with the motion and the step that were given up.
@@ -279,26 +262,7 @@ class Controller(Context):
         Raises:
             ValError: If there's nothing to go on with.
         """
-        self._wake(number, now)
-        self.resume_task(number, again=True)
-
-    def kill(self, number: int = 0, *, now: float) -> None:
-        """KILL: what stands can't go on any more.
-
-        Raises:
-            ValError: If nothing does.
-        """
-        self._wake(number, now)
-        self.kill_task(number)
-
-    def finish(self, number: int = 0, *, now: float) -> None:
-        """DONE: the present cycle of a program is its last.
-
-        Raises:
-            ValError: If it doesn't run.
-        """
-        self.now = max(now, self.now)
-        self.finish_task(number)
+        self.proceed(number, again=True, now=now)
 
     def answer(self, text: str, *, now: float) -> None:
         """A line for the PROMPT that asked.
@@ -308,9 +272,8 @@ class Controller(Context):
         """
         if not self.asking:
             raise ValError("No program asks")
-        self.now = max(now, self.now)
+        self.come(now)
         self.answers.append(text[:LONGEST_STRING])
-        self._due = True
 
     def evaluate(self, expression: Expression, *, now: float) -> Value:
         """The value of an expression.
@@ -334,7 +297,7 @@ class Controller(Context):
         self.memory.clear()
         self.compiled.clear()
         self.signals.reset()
-        self._due = True
+        self.due = True
 
     def _require_idle(self, number: int) -> None:
         """See that nothing runs as a task.
@@ -345,12 +308,6 @@ class Controller(Context):
         task = self.tasks.get(number)
         if (task is not None and task.state is ProgramState.RUNNING) or (number == 0 and self._do is not None):
             raise ValError("Program already running", f"task {number}" if number else "")
-
-    def _wake(self, number: int, now: float) -> None:
-        """See that a task stands, and look after all of them."""
-        self._require_idle(number)
-        self.now = max(now, self.now)
-        self._due = True
 
     # Time.
 
@@ -371,12 +328,12 @@ class Controller(Context):
         self.now = now = max(now, self.now)
         self.signals.advance(now=now)
         self.arm.renew(now=now)
-        self._due |= self.notice()
+        self.due |= self.notice()
         active = self._active()
         if not active:
-            self._due = False
+            self.due = False
         elif self._busy <= now:
-            self._due = False
+            self.due = False
             waits = all(task.waiting for task in active)
             start = now if waits else max(self._busy, now - (MOST_AT_ONCE - TURN) * STATEMENT)
             share = (TURN + round((now - start) / STATEMENT)) // len(active)
@@ -384,7 +341,7 @@ class Controller(Context):
             self._busy = start + done * STATEMENT
             self.signals.advance(now=now)
             # What one has done, others may wait for.
-            self._due |= self.notice() or (done > 0 and len(active) > 1)
+            self.due |= self.notice() or (done > 0 and len(active) > 1)
             if self._do is not None and self._do.state is not ProgramState.RUNNING:
                 self._do = None
         events = tuple(self.events)
@@ -397,8 +354,8 @@ class Controller(Context):
             return self.now
         active = self._active()
         if not active:
-            wanted = self.now if self._due else math.inf
-        elif self._due or not all(task.waiting for task in active):
+            wanted = self.now if self.due else math.inf
+        elif self.due or not all(task.waiting for task in active):
             wanted = self._busy
         else:
             wanted = max(self._busy, min(task.next_deadline() for task in active))

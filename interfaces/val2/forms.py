@@ -25,7 +25,6 @@ OPERATORS: Final = {row.name: row.help for row in functions.OPERATORS.values() i
 
 UNAVAILABLE: Final = {
     **dict.fromkeys(("CLEAR.EVENT", "SET.EVENT"), "there are no events; allowed: SIGNAL number, WAIT SIG(number)"),
-    **dict.fromkeys(("REACTE", "RETURNE"), "an error stops the program"),
     "MC": "commands are the monitor's",
     "RUNSIG": "allowed: SIGNAL number",
     "WEAVE": "allowed: MOVES location",
@@ -33,11 +32,19 @@ UNAVAILABLE: Final = {
 }
 """Keywords without whose work a program would do something else: an error where it comes there, and why."""
 
-IGNORED: Final = UNAVAILABLE.keys() | {
-    "DISABLE.EVENT", "ENABLE.EVENT", "FCMND", "FOPEN", "FOPEND", "FSEEK", "FSET", "INTOFF", "INTON", "NOOVERLAP",
-    "OVERLAP", "RELEASE", "SELECT", "UNLOCK",
-}  # fmt: skip
-"""Keywords that are recognised but have no meaning here, with those."""
+PASSED: Final = {
+    **dict.fromkeys(("DISABLE.EVENT", "ENABLE.EVENT"), "there are no events that could come"),
+    "FSET": "a serial line is two files here, with nothing to set",
+    **dict.fromkeys(("INTOFF", "INTON"), "no source tells what the servos' integration does; here it's on"),
+    **dict.fromkeys(("NOOVERLAP", "OVERLAP"), "CP says whether motions go round their destinations"),
+    "RELEASE": "tasks take turns by themselves",
+    "SELECT": "there is one robot",
+    "UNLOCK": "no source tells what it does",
+}
+"""Keywords that are recognised but have no meaning here, and why."""
+
+IGNORED: Final = UNAVAILABLE.keys() | PASSED.keys()
+"""Both."""
 
 _NOT_HERE: Final = frozenset(
     {"CALIBRATE", "ERROR", "ESTOP", "JHERE", "JMOVE", "MCS", "ROBOT", "SEE", "SWITCH", "TIME"}

@@ -17,7 +17,7 @@ import numpy as np
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.formats import checked, leading_number
-from interfaces.val2.rows import Form
+from interfaces.val2.rows import Form, numbered
 from interfaces.val2.signals import group
 from interfaces.val2.syntax import Apply
 from interfaces.val2.units import MESSAGES
@@ -213,13 +213,20 @@ def _of_bytes(layout: str, text: str, first: float) -> float:
 def _task(c: Context, select: float, number: float) -> float:
     if select not in (0.0, 1.0):
         raise ValError("Illegal value", f"TASK({select:.9g}): 0 is this task's number, 1 a task's state")
-    return c.task_state(c.task_number(number)) if select else float(c.task.number if c.task is not None else 0)
+    return c.task_state(numbered("task", number)) if select else float(c.task.number if c.task is not None else 0)
 
 
 def _status(c: Context, program: str) -> float:
     """Of several tasks the state of the one that does most."""
     name = program.lower()
     return max((c.task_state(n) for n, task in c.tasks.items() if task.program == name), default=0.0)
+
+
+def _error(c: Context, code: float | None) -> str:
+    if code is not None:
+        return MESSAGES.get(whole(code), f"*Error {code:.9g}*")
+    last = c.task.error if c.task is not None else None
+    return "" if last is None else str(ValError(last.what, last.detail))
 
 
 _FUNCTIONS: Final = (
@@ -234,7 +241,7 @@ _FUNCTIONS: Final = (
     Form("COS", "angle -> real", "Cosine of an angle [deg].", "VAL-II", cosine),
     Form("DEFINED", "variable:name -> real", "Whether a variable has a value.", "V+"),
     Form("ADC", "channel:channel -> real", "Value of an analogue input.", "VAL-II",
-         lambda c, n: c.channels["ADC"][c.channel(n)], tags="context reading"),
+         lambda c, n: c.channels["ADC"][numbered("channel", n)], tags="context reading"),
     Form("DISTANCE", "a:frame, b:frame -> real", "Distance of two locations [mm].", "VAL-II",
          lambda a, b: float(np.linalg.norm(a.X[:3, 3] - b.X[:3, 3]))),
     Form("DX", "a:frame -> real", "X of a location [mm].", "VAL-II", lambda a: float(a.X[0, 3])),
@@ -246,7 +253,7 @@ _FUNCTIONS: Final = (
     Form("IDENTICAL", "a:location, b:location -> truth", "Whether two locations are the same.", "VAL-II",
          lambda a, b: a == b, tags="reading"),
     Form("IOGET", "port:channel -> real", "Value of a port.", "VAL-II",
-         lambda c, n: c.channels["IOGET"][c.channel(n)], tags="context reading"),
+         lambda c, n: c.channels["IOGET"][numbered("channel", n)], tags="context reading"),
     Form("INRANGE", "a:location -> real", "0 if a location can be reached.", "V+",
          lambda c, location: 0.0 if c.arm.reaches(location, now=c.now) else 1.0, tags="context"),
     Form("INT", "x -> real", "Integer part.", "VAL-II", lambda x: float(math.trunc(x))),
@@ -277,7 +284,7 @@ _FUNCTIONS: Final = (
     Form("TIME", "-> real", "Session time [s], where no variable is called so.", "VAL-II", lambda c: c.now,
          usage="TIME", tags="context unreserved reading"),
     Form("TIMER", "number -> real", "Seconds since a timer was set to 0.", "VAL-II",
-         lambda c, number: c.now - c.timers[c.timer(number)], tags="context"),
+         lambda c, number: c.now - c.timers[numbered("timer", number)], tags="context"),
     Form("VAL", "text:string -> real", "The number that a string begins with.", "VAL-II", leading_number),
     Form("TRUE", "-> real", "What holds: -1.", "VAL-II", lambda: TRUE, tags="constant"),
     Form("FALSE", "-> real", "What doesn't hold: 0.", "VAL-II", lambda: 0.0, tags="constant"),
@@ -328,8 +335,9 @@ _FUNCTIONS: Final = (
          lambda c, unit, _: c.units.status(unit), tags="context"),
     Form("GETC", "unit, mode?=0 -> real", "Code of the next character of a file, or why there's none.", "V+",
          lambda c, unit, _: c.units.character(whole(unit)), tags="context"),
-    Form("$ERROR", "code -> string", "Text of an error that IOSTAT gives.", "V+",
-         lambda code: MESSAGES.get(whole(code), f"*Error {code:.9g}*")),
+    Form("$ERROR", "code? -> string",
+         "Text of an error that IOSTAT gives; without a code, of the task's last error.", "V+", _error,
+         tags="context"),
     Form("LNGB", "text:string, from?=1 -> real", "An integer of four characters, the highest first.", "V+",
          lambda text, first: _of_bytes(">i", text, first)),
     Form("FLTB", "text:string, from?=1 -> real", "A number of four characters.", "V+",

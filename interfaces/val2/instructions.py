@@ -40,8 +40,8 @@ from interfaces.val2.functions import OPERATORS, whole
 from interfaces.val2.memory import MOST_DIMENSIONS, Slots, VariableSlot, index, mismatch, undefined
 from interfaces.val2.motion.places import ALTER_PERIOD
 from interfaces.val2.motion.speeds import require
-from interfaces.val2.rows import Form, OperandSlot, Origin
-from interfaces.val2.signals import Reaction, Reactions, legal
+from interfaces.val2.rows import Form, OperandSlot, Origin, numbered
+from interfaces.val2.signals import USUAL, Reaction, Reactions, legal
 from interfaces.val2.structure import Structure, structure
 from interfaces.val2.syntax import (
     Apply,
@@ -55,7 +55,7 @@ from interfaces.val2.syntax import (
     literal,
     parts,
 )
-from interfaces.val2.units import OURS, TERMINAL
+from interfaces.val2.units import NOT_READY, NOT_VALID, OURS, TERMINAL
 from interfaces.val2.values import NULL, Location, Transformation, about_z
 
 Do: TypeAlias = Callable[..., object]
@@ -170,8 +170,7 @@ def _drive(c: Context, _: Instruction, joint: float, angle: float, percent: floa
 
 
 def _check_drive(c: Context, _: Instruction, joint: float, _angle: float, percent: float) -> None:
-    if joint not in range(1, 7):
-        raise ValError("Illegal joint number", f"{joint:.9g}: 1 to 6")
+    numbered("joint", joint)
     c.capped("DRIVE at", percent)
 
 
@@ -229,7 +228,7 @@ def _check_hand(_: Context, i: Instruction, opening: float | None) -> None:
 
 
 def _set_timer(c: Context, _: Instruction, number: float, seconds: float) -> None:
-    c.timers[c.timer(number)] = c.now - seconds
+    c.timers[numbered("timer", number)] = c.now - seconds
 
 
 def _switch(c: Context, i: Instruction) -> None:
@@ -253,7 +252,7 @@ def _correct(c: Context, _: Instruction, *values: float) -> None:
 
 def _channel(c: Context, i: Instruction, number: float, value: float) -> None:
     """DAC, IOPUT."""
-    c.channels[i.keyword][c.channel(number)] = value
+    c.channels[i.keyword][numbered("channel", number)] = value
 
 
 def _path(c: Context, i: Instruction) -> None:
@@ -274,9 +273,8 @@ def _base(c: Context, _: Instruction, first: float | Transformation, *others: fl
 
 
 def _lock(c: Context, _: Instruction, priority: float) -> None:
-    """Reactions have the lowest priority above 0, so that any priority above 0 defers all of them."""
     require(priority >= 0.0, priority, "a priority is 0 or above")
-    reactions_of(c).locked = priority > 0.0
+    reactions_of(c).priority = priority
 
 
 def _take_arm(c: Context, following: int) -> Pause[int]:
@@ -346,7 +344,7 @@ def _read(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
         line = c.units.read(number)
         values = None if line is None else _answers(line, names)
         if line is not None and values is None:
-            c.units.refuse(number)
+            c.units.refuse(number, NOT_VALID)
         for slot, value, name in zip(targets, values or (), names, strict=False):
             c.memory.store(slot, value, name)
         return n + 1
@@ -765,7 +763,9 @@ def _execute(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     def execute(s: Slots) -> int:
         task, cycles, step = (number(s) for number in numbers)
         code, arguments = called(s)
-        begun = c.begin(c.task_number(task), code, arguments, cycles=whole(cycles), step=whole(step), single=False)
+        begun = c.begin(
+            numbered("task", task), code, arguments, cycles=whole(cycles), step=whole(step), single=False
+        )
         if i.keyword == "PRIME":
             begun.pause("PRIME")
         return n + 1
@@ -774,17 +774,30 @@ def _execute(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 
 def _react(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    context, signal = x.context, x.of_kind("signal", i.operands[0])
+    context, signal, immediate = x.context, x.of_kind("signal", i.operands[0]), i.keyword == "REACTI"
+    given = i.operands[-1] if len(i.operands) > 1 else None
+    priority = x.of_kind("priority", given or Number(USUAL + immediate))
 
     def watch(s: Slots) -> int:
         if i.program:
             context.code(i.program, i.at)
         number = signal(s)
         legal(number)
-        reactions_of(context).add(Reaction(int(number), i.program, i.keyword == "REACTI", _always(i)))
+        reaction = Reaction(int(number), i.program, immediate, _always(i), priority(s))
+        reactions_of(context).add(reaction)
         return n + 1
 
     return watch
+
+
+def _react_to_errors(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+    def trap(_: Slots) -> int:
+        if i.program:
+            x.context.code(i.program, i.at)
+        reactions_of(x.context).on_error = i.program
+        return n + 1
+
+    return trap
 
 
 # Names.
@@ -981,7 +994,7 @@ def _movement(
 
 def _of_tasks(name: str, pc: str, explanation: str, do: Callable[[Context, int], None]) -> Iterator[Form]:
     """The rows of V+ and of VAL-II's process control of what is done to another task."""
-    act = _now(lambda c, _, number: do(c, c.task_number(number)))
+    act = _now(lambda c, _, number: do(c, numbered("task", number)))
     yield Form(name, "task:task?=0", explanation, "V+", act, tags="beside")
     if pc:
         said = explanation.replace("a task", "a process control program", 1)
@@ -1116,14 +1129,16 @@ _ROWS: Final = (
     Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
     Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
          usage="TIMER number = seconds", tags="beside", rule="timing"),
-    Form("REACT", "signal:signal, program:program?",
+    Form("REACT", "signal:signal, program:program?, priority:priority?",
          "Call a program after the present step when a signal turns on.", "VAL", _react, words="ALWAYS"),
-    Form("REACTI", "signal:signal, program:program?", "REACT, stopping the present motion at once.", "VAL", _react,
-         words="ALWAYS"),
+    Form("REACTI", "signal:signal, program:program?, priority:priority?",
+         "REACT, stopping the present motion at once.", "VAL", _react, words="ALWAYS"),
+    Form("REACTE", "program:program?", "Call a program instead of stopping when an error comes; without one, stop.",
+         "V+", _react_to_errors, rule="worded"),
     Form("IGNORE", "signal:signal", "Don't react to a signal any more.", "VAL",
          _now(lambda c, _, signal: reactions_of(c).ignore(signal))),
-    Form("LOCK", "priority", "Let reactions wait, until LOCK 0 or the end of the one that says it.", "V+",
-         _now(_lock)),
+    Form("LOCK", "priority", "Let reactions of no higher priority wait, until another LOCK or the reaction's end.",
+         "V+", _now(_lock)),
     # Control.
     Form("IF", "condition:condition, label:label?", "Do steps if a condition holds.", "VAL", _if,
          usage="IF condition THEN .. ELSE .. END, IF condition GOTO label", tags="opens program", rule="branch"),
@@ -1152,6 +1167,8 @@ _ROWS: Final = (
     Form("GOSUB", "argument:any?*", "Call a program.", "VAL", _call, usage="GOSUB program", rule="call"),
     Form("RETURN", "skipped?", "Go back to the program that called, over so many of its steps.", "VAL", _leave,
          tags="program"),
+    Form("RETURNE", "", "Go back from what REACTE called, to the step after the one with the error.", "V+", _leave,
+         tags="program reading"),
     Form("PAUSE", "", "Pause until PROCEED.", "VAL", _end_run),
     Form("STOP", "", "End this cycle of the program.", "VAL", _end_run),
     Form("HALT", "", "End the program, whatever cycles are left.", "VAL", _end_run),
@@ -1164,7 +1181,9 @@ _ROWS: Final = (
            _now(lambda c, i, unit, _r, _m, file: c.units.open(i.keyword, whole(unit), file)),
            usage=f"{name} (unit, record, mode) file", rule="device")
       for name, what in (("FOPENR", "to read"), ("FOPENW", "that isn't there, to write"),
-                         ("FOPENA", "to write at its end"))),
+                         ("FOPENA", "to write at its end"),
+                         ("FOPEND", "that lists the directory: READ gives name, length and blanks"),
+                         ("FOPEN", "of a window or a network: IOSTAT says that it isn't here"))),
     Form("FCLOSE", "unit", "Close a file; what was written is there then.", "V+",
          _now(lambda c, _, unit: c.units.close(whole(unit))), usage="FCLOSE (unit)", rule="device"),
     Form("FEMPTY", "unit", "Write out what is still to be written: at FCLOSE, here.", "V+", _now(lambda *_: None),
@@ -1172,6 +1191,12 @@ _ROWS: Final = (
     Form("FDELETE", "unit, file:string", "Delete a file.", "V+",
          _now(lambda c, _, unit, file: c.units.delete(whole(unit), file)), usage="FDELETE (unit) file",
          rule="device"),
+    Form("FSEEK", "unit, line", "Let the next READ of a file begin at a line, from 1.", "V+",
+         _now(lambda c, _, unit, line: c.units.seek(whole(unit), whole(line))), usage="FSEEK (unit, line)",
+         rule="device", tags="reading"),
+    Form("FCMND", "unit, command, text:string?", "Refused, and IOSTAT says so: of disk commands, FDELETE is here.",
+         "V+", _now(lambda c, _, unit, *_others: c.units.refuse(whole(unit), NOT_READY)),
+         usage="FCMND (unit, command) text", rule="device"),
     Form("READ", "unit, record?, mode?, variable:variable*", "Read values of the next line of a file, or terminal.",
          "V+", _read, usage="READ (unit, record, mode) variable, ..", rule="device"),
     Form("WRITE", "unit, record?, mode?, item:any?*", "Write a line to a file, or terminal, as TYPE does.", "V+",
@@ -1188,11 +1213,11 @@ _ROWS: Final = (
          usage="PRIME [task] program(argument, ..)[, cycles[, step]]", rule="tasks", tags="beside"),
     *_of_tasks("ABORT", "PCABORT", "Stop a task at once; it can go on.", Context.abort_task),
     *_of_tasks("PROCEED", "PCPROCEED", "Let a task that stands go on, with its next step.",
-               partial(Context.resume_task, again=False)),
+               Context.proceed),
     *_of_tasks("RETRY", "PCRETRY", "Let a task that stands go on, with the step that it was at.",
-               partial(Context.resume_task, again=True)),
-    *_of_tasks("KILL", "", "Let a task that stands be at its end.", Context.kill_task),
-    *_of_tasks("CYCLE.END", "PCEND", "Let the present cycle of a task be its last.", Context.finish_task),
+               partial(Context.proceed, again=True)),
+    *_of_tasks("KILL", "", "Let a task that stands be at its end.", Context.kill),
+    *_of_tasks("CYCLE.END", "PCEND", "Let the present cycle of a task be its last.", Context.finish),
     # Dialogue and names.
     Form("TYPE", "item:any?*", "Print texts and values; /F8.2 and such say how.", "VAL", _type, tags="beside",
          rule="items"),

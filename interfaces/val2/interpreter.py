@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from interfaces.val2.context import (
     ARM,
+    EXTRA_STEP_COST,
     Action,
     Code,
     Context,
@@ -25,7 +26,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.instructions import until
 from interfaces.val2.memory import VariableSlot
 from interfaces.val2.printer import print_step
-from interfaces.val2.signals import Reaction, Reactions
+from interfaces.val2.signals import HIGHEST, Reaction, Reactions
 from vrs.errors import VrsError
 
 TRACE_COST: Final = 2_500
@@ -40,8 +41,8 @@ class CallFrame:
 
     code: Code
     slots: list[Any]
-    level: int = 0
-    """Of the reaction that it's in; 0 for none."""
+    restores: float | None = None
+    """Of a reaction, the priority that holds again after it."""
     pc: int = 0
     """Index of the step that runs, or waits, or is next."""
     waiting: Waiting | None = None
@@ -100,8 +101,11 @@ class Task:
         self.state = ProgramState.RUNNING
         self.word = ""
         """Why it paused or ended."""
+        self.error: ValError | None = None
+        """The last one: what REACTE's program reacts to."""
         self.deadline = math.inf
         """When a wait wants to be looked at again."""
+        self._done = 0
         self._interrupted = False
         self.frames = [CallFrame(code, code.slots(arguments), pc=step - 1)]
 
@@ -128,27 +132,33 @@ class Task:
         Returns:
             Steps that it did.
         """
-        done, self.context.task = 0, self
-        try:
-            while done < most and self.state is ProgramState.RUNNING:
-                self._react()
-                frame = self.frames[-1]
-                if frame.waiting is None:
-                    traced = self.context.switches["TRACE"] and self._trace(frame)
-                    done += self._compute(frame, 1 if self.single or traced else most - done)
-                    done += self.context.extra_steps
-                    self.context.extra_steps = 0
-                elif not self._wait(frame):
+        self._done, self.context.task = 0, self
+        while self._done < most and self.state is ProgramState.RUNNING:
+            try:
+                if not self._take_turn(most - self._done):
                     break
-                if self.single and self.state is ProgramState.RUNNING and not self.waiting:
-                    self.pause("XSTEP")
-        except ValError as error:
-            self.fail(error)
-        except VrsError as error:
-            self.fail(ValError("Motion error", str(error)))
+            except ValError as error:
+                self._react_to(error)
+            except VrsError as error:
+                self._react_to(ValError("Motion error", str(error)))
         self.context.notice()
         self.context.task = None
-        return done
+        return self._done
+
+    def _take_turn(self, most: int) -> bool:
+        """Do some steps, or see whether a wait is over; whether there may be more to do."""
+        self._react()
+        frame = self.frames[-1]
+        if frame.waiting is None:
+            traced = self.context.switches["TRACE"] and self._trace(frame)
+            self._compute(frame, 1 if self.single or traced else most)
+            self._done += self.context.extra_steps
+            self.context.extra_steps = 0
+        elif not self._wait(frame):
+            return False
+        if self.single and self.state is ProgramState.RUNNING and not self.waiting:
+            self.pause("XSTEP")
+        return True
 
     def _trace(self, frame: CallFrame) -> bool:
         """Tell which step is done; whether there's one, a DO's not counted."""
@@ -160,7 +170,7 @@ class Task:
         self.context.events.append(Traced(frame.name, frame.step, text, self.number))
         return True
 
-    def _compute(self, frame: CallFrame, most: int) -> int:
+    def _compute(self, frame: CallFrame, most: int) -> None:
         steps, slots, pc = frame.code.steps, frame.slots, frame.pc
         following, left = pc, most
         try:
@@ -172,9 +182,9 @@ class Task:
                 pc = following
         finally:
             frame.pc = pc
+            self._done += most - left
         if following < 0:
             self._act(self.context.pending, frame)
-        return most - left
 
     def _wait(self, frame: CallFrame) -> bool:
         """Whether a wait is over."""
@@ -194,7 +204,7 @@ class Task:
             case Waiting():
                 frame.waiting = action
             case Invoke(code, slots, following):
-                self._push(CallFrame(code, slots, frame.level))
+                self._push(CallFrame(code, slots))
                 frame.pc = following
             case Ending("RETURN", skipped):
                 self._leave(frame, skipped)
@@ -216,8 +226,8 @@ class Task:
             return
         self._release(self.frames.pop())
         self.frames[-1].pc = min(self.frames[-1].pc + skipped, len(self.frames[-1].code.program.steps))
-        if frame.level > self.frames[-1].level:
-            self.reactions.locked = False
+        if frame.restores is not None:
+            self.reactions.priority = frame.restores
 
     def _release(self, frame: CallFrame) -> None:
         for slot in frame.slots[len(frame.code.program.parameters) : frame.code.names]:
@@ -231,6 +241,7 @@ class Task:
         self._unwind()
         self.cycles = max(self.cycles - 1, -1)
         self.frames = [CallFrame(self.code, self.code.slots(self.arguments))]
+        self.reactions.priority = 0.0
         if self.robot:
             self.context.arm.begin_program()
 
@@ -246,20 +257,39 @@ class Task:
         self.context.notice()
         frame = self.frames[-1]
         amid = frame.waiting is not None and not frame.waiting.interruptible
-        reaction = self.reactions.due(max(frame.level, 1) if amid else frame.level)
+        reaction = self.reactions.due(immediate=amid)
         if reaction is not None:
             self._call(reaction, frame)
+
+    def _react_to(self, error: ValError) -> None:
+        """Call what REACTE names, and go on with the next step after it; an error in it, or without it, stops."""
+        self.error, self._done, trap = error, self._done + EXTRA_STEP_COST, self.reactions.on_error
+        if not (trap and self.program) or self.reactions.priority >= HIGHEST:
+            self.fail(error)
+            return
+        frame = self.frames[-1]
+        try:
+            self._call_program(trap, HIGHEST)
+        except ValError as failure:
+            self.fail(failure)
+        else:
+            frame.drop()
+            frame.pc = min(frame.pc + 1, len(frame.code.program.steps))
+
+    def _call_program(self, name: str, priority: float) -> None:
+        code = self.context.code(name)
+        self._push(CallFrame(code, code.slots([]), self.reactions.priority))
+        self.reactions.priority = priority
 
     def _call(self, reaction: Reaction, frame: CallFrame) -> None:
         context = self.context
         if reaction.immediate:
             context.dropped += not context.arm.ready(now=context.now)
             context.brake()
-        if not reaction.program:
+        if reaction.program:
+            self._call_program(reaction.program, reaction.priority)
+        else:
             self._leave(frame)
-            return
-        code = context.code(reaction.program)
-        self._push(CallFrame(code, code.slots([]), reaction.level))
 
     # Interruptions.
 

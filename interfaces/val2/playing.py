@@ -25,6 +25,7 @@ from interfaces.val2.context import (
     Warned,
 )
 from interfaces.val2.controller import STATEMENT, TURN, Controller
+from interfaces.val2.corrections import Corrections, Corrector
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.source import SourceFile
@@ -63,6 +64,7 @@ class Player:
         *,
         units: Units | None = None,
         skips: bool = False,
+        corrections: Corrections | None = None,
     ) -> None:
         """Load the file.
 
@@ -73,6 +75,7 @@ class Player:
             rng: Of RANDOM.
             units: Its files; none unless given.
             skips: Whether it goes on after what it can't reach, and after PAUSE.
+            corrections: What comes from elsewhere for ALTER; nothing unless given.
 
         Raises:
             ValError: If there's no program.
@@ -91,6 +94,7 @@ class Player:
         for entry in source.values:
             controller.memory.set(entry.variable, entry.value)
         controller.cell = source.signals
+        self._corrector = None if corrections is None else Corrector(corrections, arm)
 
     def begin(self, now: float) -> None:
         """Execute the program.
@@ -104,11 +108,19 @@ class Player:
         """Do what is due by now [s]."""
         for event in self._controller.advance(now=now):
             self._take(event, now)
+        for problem in () if self._corrector is None else self._corrector.advance(now):
+            self._listeners.warned(problem)
         self.done |= self._ended and not self._goes_on()
+        if self.done and self._corrector is not None and self._corrector.missed:
+            self._listeners.warned(f"{self._corrector.missed} corrections came while no program said ALTER")
+            self._corrector = None
 
     def next_deadline(self) -> float:
         """When something is due [s]; infinity where nothing will ever be."""
-        return math.inf if self.done else self._controller.next_deadline()
+        if self.done:
+            return math.inf
+        corrected = math.inf if self._corrector is None else self._corrector.next_deadline()
+        return min(corrected, self._controller.next_deadline())
 
     def expire(self, now: float, limit: float) -> None:
         """Give a program up that nothing wakes, or that hasn't ended by a time [s]."""

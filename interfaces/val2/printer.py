@@ -160,8 +160,8 @@ def print_statement(statement: Instruction) -> str:
             inside = STATEMENTS[keyword].inside
             unit, others = _listed(statement.operands[:inside]).rstrip(","), _listed(statement.operands[inside:])
             return f"{keyword} ({unit}) {others}".rstrip() if statement.operands else keyword
-        case "worded", [signal] if statement.program:
-            listed = f"{signal}, {statement.program}"
+        case "worded", given if statement.program:
+            listed = ", ".join([*given[:1], statement.program, *given[1:]])
         case "switches", _:
             return f"{keyword} {', '.join(words)}"
         case "names", _:

@@ -14,8 +14,8 @@ from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
     "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "task", "channel",
-    "signal", "output", "string", "alike", "location", "frame", "point", "any", "label", "count", "program",
-    "variable", "array", "name", "text",
+    "priority", "signal", "output", "string", "alike", "location", "frame", "point", "any", "label", "count",
+    "program", "variable", "array", "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
 what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are
@@ -145,6 +145,16 @@ class Setting:
     high: float = 1.0
     unit: str = ""
 
+    def require(self, value: float, what: str = "Illegal value", at: TextPosition | None = None) -> None:
+        """See that a parameter may have a value.
+
+        Raises:
+            ValError: If it may not.
+        """
+        if not self.low <= value <= self.high:
+            detail = f"{value:.9g}; allowed: {self.name} of {self.low:g} to {self.high:g} {self.unit}"
+            raise ValError(what, detail.rstrip(), place=at)
+
 
 SWITCHES: Final = {
     row.name: row
@@ -169,3 +179,21 @@ PARAMETERS: Final = {
     )
 }
 """What PARAMETER sets."""
+TIMERS: Final = range(16)
+CHANNELS: Final = range(1, 33)
+"""Of analogue inputs and outputs, and of ports, each."""
+TASKS: Final = range(28)
+"""Programs that may run beside each other. Task 0 is the main one, which has the arm as it begins."""
+NUMBERS: Final = {"timer": TIMERS, "channel": CHANNELS, "task": TASKS, "joint": range(1, 7)}
+
+
+def numbered(what: str, number: float) -> int:
+    """The number of a timer, a channel, a task or a joint.
+
+    Raises:
+        ValError: If there's no such one.
+    """
+    numbers = NUMBERS[what]
+    if number not in numbers:
+        raise ValError(f"Illegal {what} number", f"{number:.9g}: {numbers[0]} to {numbers[-1]}")
+    return int(number)

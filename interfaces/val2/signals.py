@@ -5,8 +5,7 @@ takes the value of an expression once it has held that value for the rule's dela
 there when the belt has run for so long.
 
 REACT and REACTI watch signals. A reaction is to a turning of the signal after REACT. It's done once, or with ALWAYS
-each time. While the program that it calls runs, other reactions wait; a REACTI alone comes into the program of a
-REACT. LOCK lets all of them wait.
+each time. While the program that it calls runs, reactions of no higher priority wait, as while LOCK says so.
 """
 
 from __future__ import annotations
@@ -251,6 +250,12 @@ class Signals:
         self._changes.append((number, on))
 
 
+USUAL: Final = 1.0
+"""Priority of a REACT, unless it says another; that of a REACTI is the next one."""
+HIGHEST: Final = 254.0
+"""Priority of what REACTE calls."""
+
+
 @dataclass(frozen=True, slots=True)
 class Reaction:
     """What is done when a signal turns."""
@@ -261,11 +266,7 @@ class Reaction:
     """What is called; empty to return from the program that runs."""
     immediate: bool
     always: bool
-
-    @property
-    def level(self) -> int:
-        """REACTI is before REACT."""
-        return 2 if self.immediate else 1
+    priority: float = USUAL
 
 
 class Reactions:
@@ -274,8 +275,10 @@ class Reactions:
     def __init__(self) -> None:
         self._watched: dict[int, Reaction] = {}
         self._turned: list[Reaction] = []
-        self.locked = False
-        """Whether reactions wait for LOCK 0."""
+        self.priority = 0.0
+        """Reactions of no higher one wait: that of LOCK, or of the reaction whose program runs."""
+        self.on_error = ""
+        """The program that REACTE names; empty for none."""
 
     def add(self, reaction: Reaction) -> None:
         """REACT, REACTI: watch a signal; this takes the place of what was watched of it.
@@ -298,10 +301,10 @@ class Reactions:
         self._turned = [r for r in self._turned if abs(r.signal) != number]
 
     def clear(self) -> None:
-        """Watch nothing, and lock nothing."""
+        """Watch nothing, and let nothing wait."""
         self._watched.clear()
         self._turned.clear()
-        self.locked = False
+        self.priority, self.on_error = 0.0, ""
 
     def notice(self, number: int, on: bool) -> None:
         """A signal has turned."""
@@ -309,12 +312,12 @@ class Reactions:
         if reaction is not None and (reaction.signal > 0) == on and reaction not in self._turned:
             self._turned.append(reaction)
 
-    def due(self, level: int) -> Reaction | None:
-        """The most urgent reaction whose signal has turned, above a level; it's taken off. None while locked."""
-        above = [r for r in self._turned if r.level > level]
-        if self.locked or not above:
+    def due(self, *, immediate: bool = False) -> Reaction | None:
+        """The most urgent reaction whose signal has turned, or of those of REACTI; it's taken off."""
+        above = [r for r in self._turned if r.priority > self.priority and r.immediate >= immediate]
+        if not above:
             return None
-        reaction = max(above, key=lambda r: r.level)
+        reaction = max(above, key=lambda r: r.priority)
         self._turned.remove(reaction)
         if not reaction.always:
             self._watched.pop(abs(reaction.signal), None)

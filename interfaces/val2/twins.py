@@ -12,6 +12,7 @@ from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
 from interfaces.runs.twin_run import QUANTILE, RunKeeper, TwinRun
 from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
+from interfaces.val2.corrections import Corrections
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.playing import Listeners, Player
@@ -99,6 +100,7 @@ def play(
     listeners: Listeners | None = None,
     limit: float = LONGEST,
     files: Path | None = None,
+    corrections: Corrections | None = None,
     progress: Progress | None = None,
     keeper: RunKeeper | None = None,
 ) -> Played:
@@ -115,6 +117,7 @@ def play(
         listeners: Who hears what the program says; nobody by default.
         limit: When the program is given up [s].
         files: The directory of the program's files; it has none unless given.
+        corrections: What comes from elsewhere for ALTER; nothing unless given.
         progress: Called now and then with the user time reached [s].
         keeper: Who writes the run down while it goes on.
 
@@ -131,7 +134,9 @@ def play(
         site = SiteRobot(session.operator, operator.execute)
         val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
-        operator.player = player = Player(source, val, listeners or Listeners(), rng, units=Units(files))
+        operator.player = player = Player(
+            source, val, listeners or Listeners(), rng, units=Units(files), corrections=corrections
+        )
         session.last_action = math.inf
         player.begin(0.0)
         session.lab.schedule(0.0, operator.advance)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Final
 
@@ -31,9 +32,12 @@ MESSAGES: Final = {
     NOT_VALID: "*Invalid file specification*",
 }  # fmt: skip
 """What IOSTAT gives where something couldn't be done, and $ERROR of it."""
+SECTOR: Final = 512
+"""In which a listing counts lengths [B]."""
 LARGEST: Final = 4_000_000
 """Longest file [characters]."""
 _SERIAL: Final = re.compile(r"(?:LOCAL\.)?SERIAL:?([0-5])", re.IGNORECASE)
+_FOLDER: Final = re.compile(r"(?:[A-Za-z]+:)?\\?")
 _NAME: Final = re.compile(r"(?:[A-Za-z]+:)?\\?([A-Za-z0-9_][A-Za-z0-9_.-]{0,99})")
 
 
@@ -108,12 +112,15 @@ class Units:
         self._status[unit] = DONE if self._units.pop(unit, None) is not None else NOT_ATTACHED
 
     def open(self, keyword: str, unit: int, name: str) -> None:
-        """FOPENR, FOPENW, FOPENA: a file to read, a new one, or one to add to."""
+        """FOPENR, FOPENW, FOPENA, FOPEND: a file to read, a new one, one to add to, or the directory."""
         self._status[unit] = self._opened(keyword, unit, name)
 
     def _opened(self, keyword: str, unit: int, name: str) -> float:
         known, path = self._units.get(unit), self._path(name)
-        if known is None or path is None:
+        if known is not None and keyword == "FOPEND" and self.directory is not None:
+            self._units[unit] = _Unit(self.directory, self._listing(name))
+            return DONE
+        if known is None or path is None or keyword == "FOPEN":
             return NOT_ATTACHED if known is None else NOT_VALID
         text = self._read(path)
         if keyword == "FOPENW" and text is not None:
@@ -123,6 +130,18 @@ class Units:
         writes = keyword != "FOPENR"
         self._units[unit] = _Unit(path, text or "", len(text or "") if writes else 0, writes)
         return DONE
+
+    def _listing(self, pattern: str) -> str:
+        """Files of the directory that a pattern fits, a line each: name, length in sectors; dates are blank."""
+        assert self.directory is not None
+        wanted = (_FOLDER.sub("", pattern.strip()) or "*").replace("*.*", "*").lower()
+        paths = {*self._written, *self.directory.iterdir()}
+        texts = {path: text for path in sorted(paths) if (text := self._read(path)) is not None}
+        return "".join(
+            f"{path.stem:8}.{path.suffix[1:]:3}{-(-len(text.encode()) // SECTOR):8}{'':26}\n"
+            for path, text in texts.items()
+            if fnmatchcase(path.name.lower(), wanted)
+        )
 
     def _path(self, name: str) -> Path | None:
         found = _NAME.fullmatch(name.strip())
@@ -182,9 +201,20 @@ class Units:
         self._status[unit] = DONE
         return line
 
-    def refuse(self, unit: int) -> None:
-        """A line that was read isn't what was wanted."""
-        self._status[unit] = NOT_VALID
+    def seek(self, unit: int, line: int) -> None:
+        """FSEEK: go to the beginning of a line, from 1."""
+        known = self._units.get(unit)
+        if known is None or known.path is None:
+            self._status[unit] = NOT_OPEN
+            return
+        lines = known.text.splitlines(keepends=True)
+        there = 1 <= line <= len(lines)
+        known.place = sum(map(len, lines[: line - 1])) if there else known.place
+        self._status[unit] = DONE if there else ENDED
+
+    def refuse(self, unit: int, why: float) -> None:
+        """Let IOSTAT say why something couldn't be done, a line that was read not be what was wanted, such as."""
+        self._status[unit] = why if unit in self._units else NOT_ATTACHED
 
     def character(self, unit: int) -> float:
         """GETC: the code of the next character, or why there's none."""

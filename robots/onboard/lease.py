@@ -176,6 +176,22 @@ class Lease:
         self._next = holder
         return Pending(holder)
 
+    def revoke(self, *, admin: bool, now: float) -> LeaseRefusal | None:
+        """Take the lease from whoever has it, or is about to take it over, for nobody: None, or why not.
+
+        Args:
+            admin: Whether the caller has seen the admin's token.
+            now: [s].
+        """
+        self._check(now)
+        if admin is not True:
+            return LeaseRefusal.NOT_ADMIN
+        self._expire(now)
+        if self._state is LeaseState.HELD:
+            self._end(LeaseEnd.TAKEN_OVER, now)
+        self._next = None
+        return None
+
     def release(self, epoch: int, *, now: float) -> LeaseRefusal | None:
         """Give the lease back: None, or why not. An epoch that isn't in force releases nothing."""
         self._check(now)

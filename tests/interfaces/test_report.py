@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from interfaces.cli.demo import tables
 from interfaces.messages.recording import CommandPacket, RunEvent
 from interfaces.report.html import render, write_report
 from interfaces.report.plots import plots
 from interfaces.report.scene import chain_of, scene
-from interfaces.report.tables import time_lines
+from interfaces.report.tables import ENDED_SHORT, figures, tiles
 from interfaces.runs.summary import summarize
 from interfaces.runs.twin_run import TwinRun
 from interfaces.teleop import Correction
@@ -147,9 +148,30 @@ def test_robots_that_stand_have_no_lag() -> None:
     assert value["lag_timeline_s"] is None
     assert value["lag_user_s"] is None
     assert value["errors"]["lag_removed"] == value["errors"]["timeline_time"]
-    assert "Control: a robot that stands has no lag." in time_lines(value)[0]
-    assert "Control: its joints lag another 0.000 s." in time_lines(summarize(run))[0]
+    assert not any(label.startswith("network: ") for _, label in tiles(value))
+    lagging = dict(rows for rows in tiles(summarize(run)) if rows[1].startswith("network: "))
+    assert [text.endswith(" + 0.000 s") for text in lagging] == [True]
     assert "control: the joints' lag" not in render(run, value)
+
+
+def test_a_path_that_wasnt_driven_to_its_end_says_that_means_dont_compare() -> None:
+    value, where = summarize(make_run()), "Tool path and time difference, user time"
+    for progress, note in ((1.0, ""), (0.4, ENDED_SHORT)):
+        shown = figures({**value, "path": {**value["path"], "progress": progress}})
+        assert [sheet[3] for sheet in shown if sheet[0] == where] == [note]
+
+
+def test_the_terminal_has_the_pages_tables_with_their_units(capsys: pytest.CaptureFixture[str]) -> None:
+    tables({**summarize(make_run()), "gap_s": 2.0})
+    shown = capsys.readouterr().out
+    for text in (
+        "worst joint, rms, equal timeline time",
+        "joint 1 rms [deg]",
+        "tool max [mm]",
+        "virtual: accepted",
+    ):
+        assert text in shown
+    assert "is in no figure. (2.000 s)" in shown
 
 
 def test_plots_cover_the_offset_errors_and_every_joint() -> None:

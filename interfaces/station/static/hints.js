@@ -1,11 +1,11 @@
 // Three hints on the first visit, one at a time, each beside what it's about; they block nothing.
-import { h, icon, write } from "./dom.js";
+import { html, Icon, useEffect, useLayoutEffect, useOn, useRef, useState } from "./ui.js";
 
 const KEY = "vrs-hints";
 /** Distance from what it points at, and from the window's edge [px]. */
 const [GAP, EDGE] = [12, 8];
 
-/** Where a hint stands: below, left of or above the first of these that is shown. */
+/** Where a hint stands: below, left of (or above, where there's no room) or above the first of these that is shown. */
 const HINTS = [
   { at: ["#take", "#give", "#control-pill"], side: "below", title: "Take control",
     text: "Nothing moves before you have it. Others see who has it, and watch." },
@@ -24,81 +24,73 @@ const DRIVING = [
     text: "The blue ghost answers at once. The solid robot follows the orange path as soon as the network lets it." },
 ];
 
-export function mount(station) {
+export function Panel({ station }) {
+  const { link, lease } = station.session;
   const hints = station.drives ? DRIVING : HINTS;
-  const count = h("span.muted");
-  const title = h("h2", { id: "hint-title" });
-  const text = h("p", { id: "hint-text" });
-  const next = h("button.main", { type: "button", id: "hint-next" });
-  const close = h("button", { type: "button", id: "hint-close" }, "Close");
-  const arrow = h("i.arrow", { "aria-hidden": "true" });
-  const bubble = h("section.bubble", { id: "hint", hidden: true, role: "region", "aria-labelledby": "hint-title" },
-    arrow, title, text, h("div.row", {}, count, h("span.grow"), close, next));
-  const help = h("button.quiet", { type: "button", id: "help", "aria-label": "Show the hints", title: "Show the hints" },
-    icon("help_outline"));
-  document.getElementById("panel-theme").append(help);
-  // After the bar: whoever walks by keys comes by soon.
-  document.getElementById("bar").after(bubble);
-  let at = null;
-  let asked = false;
+  const [at, setAt] = useState(null);
+  const [bubble, help, next] = [useRef(null), useRef(null), useRef(null)];
+  /** Whether somebody asked for them, and walks on by them. */
+  const asked = useRef(false);
+  const hint = hints[at];
 
-  function show(number) {
-    at = number;
-    const hint = hints[at];
-    write(title, hint.title);
-    write(text, hint.text);
-    write(count, `${at + 1} of ${hints.length}`);
-    write(next, at + 1 < hints.length ? "Next" : "Done");
-    bubble.hidden = false;
+  useEffect(() => {
+    if (link === "live" && localStorage.getItem(KEY) === null) setAt((now) => now ?? 0);
+  }, [link]);
+  useLayoutEffect(() => {
     place();
-    station.announce(`Hint ${at + 1} of ${hints.length}. ${hint.title}. ${hint.text}`);
+    if (asked.current) next.current.focus();
+    asked.current = false;
+    if (hint) station.announce(`Hint ${at + 1} of ${hints.length}. ${hint.title}. ${hint.text}`);
+  }, [at]);
+  // Who has control changes the bar: what it points at may stand elsewhere then.
+  useEffect(() => {
+    const later = requestAnimationFrame(place);
+    return () => cancelAnimationFrame(later);
+  }, [at, lease]);
+  useOn(window, "resize", place);
+  useOn(window, "keydown", (event) => event.key === "Escape" && end(), { capture: true });
+
+  function ask() {
+    asked.current = true;
+    setAt(0);
   }
 
   function end() {
-    if (at === null) return;
-    const inside = bubble.contains(document.activeElement);
-    at = null;
-    bubble.hidden = true;
+    if (!hint) return;
+    if (bubble.current.contains(document.activeElement)) help.current.focus();
     localStorage.setItem(KEY, "seen");
-    if (inside) help.focus();
+    setAt(null);
   }
 
   /** Beside what it's about, inside the window, and below the bar, where STOP is. */
   function place() {
-    if (at === null) return;
-    const { at: names, side } = hints[at];
-    const found = names.map((name) => document.querySelector(name)).find((one) => one && one.getClientRects().length);
+    if (!hint) return;
+    const found = hint.at.map((name) => document.querySelector(name)).find((one) => one?.getClientRects().length);
     const target = (found ?? document.getElementById("bar")).getBoundingClientRect();
-    const { offsetWidth: width, offsetHeight: height } = bubble;
+    const { offsetWidth: width, offsetHeight: height, dataset, style } = bubble.current;
+    const side = hint.side === "left" && target.left < width + GAP + EDGE ? "above" : hint.side;
     const bar = document.getElementById("bar").getBoundingClientRect().bottom;
     const middle = [target.left + target.width / 2, target.top + Math.min(target.height / 2, 120)];
     let [x, y] = { below: [middle[0] - width / 2, target.bottom + GAP], left: [target.left - width - GAP, middle[1] - height / 2],
       above: [middle[0] - width / 2, target.top - height - GAP] }[side];
     x = Math.max(EDGE, Math.min(x, window.innerWidth - width - EDGE));
     y = Math.max(bar + EDGE, Math.min(y, window.innerHeight - height - EDGE));
-    bubble.style.left = `${Math.round(x)}px`;
-    bubble.style.top = `${Math.round(y)}px`;
-    bubble.dataset.side = side;
-    const along = side === "left" ? middle[1] - y : middle[0] - x;
-    arrow.style.setProperty("--along", `${Math.round(Math.max(16, Math.min(along, (side === "left" ? height : width) - 16)))}px`);
+    [style.left, style.top, dataset.side] = [`${Math.round(x)}px`, `${Math.round(y)}px`, side];
+    const [along, length] = side === "left" ? [middle[1] - y, height] : [middle[0] - x, width];
+    style.setProperty("--along", `${Math.round(Math.max(16, Math.min(along, length - 16)))}px`);
   }
 
-  next.addEventListener("click", () => (at + 1 < hints.length ? show(at + 1) : end()));
-  close.addEventListener("click", end);
-  help.addEventListener("click", () => {
-    show(0);
-    next.focus();
-  });
-  window.addEventListener("keydown", (event) => event.key === "Escape" && end(), { capture: true });
-  new ResizeObserver(place).observe(document.getElementById("tab-panels"));
-  window.addEventListener("resize", place);
-  station.on("lease", () => requestAnimationFrame(place));
-
-  station.on("link", first);
-  function first() {
-    if (asked || station.session.link !== "live") return;
-    asked = true;
-    if (localStorage.getItem(KEY) === null) show(0);
-  }
-  first();
+  const last = at + 1 === hints.length;
+  return html`
+    <button class="quiet" type="button" id="help" ref=${help} aria-label="Show the hints" title="Show the hints" onClick=${ask}>
+      <${Icon} name="help_outline" /></button>
+    <section class="bubble" id="hint" ref=${bubble} hidden=${!hint} role="region" aria-labelledby="hint-title">
+      <i class="arrow" aria-hidden="true"></i>
+      <h2 id="hint-title">${hint?.title}</h2>
+      <p id="hint-text">${hint?.text}</p>
+      <div class="row"><span class="muted">${at + 1} of ${hints.length}</span><span class="grow"></span>
+        <button type="button" id="hint-close" onClick=${end}>Close</button>
+        <button class="main" type="button" id="hint-next" ref=${next} onClick=${() => (last ? end() : setAt(at + 1))}>
+          ${last ? "Done" : "Next"}</button>
+      </div></section>`;
 }

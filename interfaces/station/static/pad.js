@@ -66,7 +66,7 @@ export function mountPad(station, box, steer, jog, words = TOOL) {
       return;
     }
     const pressed = pad.buttons[1]?.pressed === true;
-    if (pressed && !stopped) station.shared.stop();
+    if (pressed && !stopped) station.stop.press();
     stopped = pressed;
     const moves = twistOf(pad).some((part) => part !== 0);
     if (moves && !held && station.session.holds) station.notices.use(null);

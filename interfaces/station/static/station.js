@@ -2,8 +2,9 @@
 import { Chain } from "./chain.js";
 import { DriveSession } from "./drivesession.js";
 import { App, Layout } from "./layout.js";
-import { Notices } from "./notice.js";
+import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
+import { Stop } from "./stop.js";
 import { html, observed, render } from "./ui.js";
 
 const NAME = "vrs-name";
@@ -22,7 +23,10 @@ class Station extends EventTarget {
     /** What panels offer each other, by the panel's name. */
     this.shared = {};
     observed(this, { polite: "", urgent: "" });
+    /** What couldn't be done, said at the control that was used. */
     this.notices = new Notices(this.session);
+    /** STOP: `stop.press()`. */
+    this.stop = new Stop(this);
   }
 
   /** Say something to those who listen to the page. */
@@ -48,6 +52,7 @@ class Station extends EventTarget {
 
 function Page({ station }) {
   return html`<${App} station=${station} />
+    <${Notice} notices=${station.notices} />
     <div class="spoken" aria-live="polite">${station.polite}</div>
     <div class="spoken" role="alert" aria-live="assertive" id="alert">${station.urgent}</div>`;
 }
@@ -65,7 +70,6 @@ const config = JSON.parse(root.dataset.config);
 const station = new Station(config);
 window.station = station;
 render(html`<${Page} station=${station} />`, root);
-root.append(station.notices.box);
 const { layout } = station;
 const modules = await Promise.all(config.panels.map(({ name }) => import(`./${name}.js`)));
 for (const [k, { name }] of config.panels.entries()) {

@@ -19,14 +19,24 @@ export function observed(object, fields) {
 }
 
 /** Listen to what happens (an order, an outcome, a problem) for as long as the component is there. */
-export function useOn(target, type, listener) {
+export function useOn(target, type, listener, options) {
   const newest = useRef(listener);
   newest.current = listener;
   useEffect(() => {
-    const hear = (event) => newest.current(event.detail ?? event);
-    target.addEventListener(type, hear);
-    return () => target.removeEventListener(type, hear);
+    const hear = (event) => newest.current(event instanceof CustomEvent ? event.detail : event);
+    target.addEventListener(type, hear, options);
+    return () => target.removeEventListener(type, hear, options);
   }, [target, type]);
+}
+
+/** Do something every so often [ms] for as long as the component is there. */
+export function useEvery(period, action) {
+  const newest = useRef(action);
+  newest.current = action;
+  useEffect(() => {
+    const timer = setInterval(() => newest.current(), period);
+    return () => clearInterval(timer);
+  }, [period]);
 }
 
 /** A symbol by its name in `OUTLINES`; people hear and read the words beside it. */

@@ -273,6 +273,9 @@ function checkLease(m) {
   m.answers = m.answers === undefined || m.answers === null ? null : whole(m.answers, 1, WHOLE, "lease.answers"); // Number of the receiver's request that this answers.
   m.ended = m.ended === undefined || m.ended === null ? null : word(m.ended, LEASE_END, "lease.ended"); // How the one before ended; absent: there was none.
   m.shared = m.shared === undefined ? false : flag(m.shared, "lease.shared"); // Whether the receiver shares it: it commands under the epoch, but doesn't keep it.
+  m.member = m.member === undefined ? 0 : whole(m.member, 0, WHOLE, "lease.member"); // In a class, the receiver's number in `Present`; 0: there's no class.
+  m.waiting = m.waiting === undefined ? 0 : whole(m.waiting, 0, WHOLE, "lease.waiting"); // In a class, the receiver's place in the queue, from 1; 0: it isn't in it.
+  m.offered_until = m.offered_until === undefined || m.offered_until === null ? null : real(m.offered_until, -1e9, 1e9, "lease.offered_until"); // In a class: the lease is offered to the receiver, to be acquired until then [s]; absent: it isn't.
   return m;
 }
 
@@ -369,6 +372,29 @@ function checkCorrected(m) {
   if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
   whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
   m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
+  return m;
+}
+
+/** A client of a class. */
+function checkMember(m) {
+  map(m, "Member");
+  whole(m.number, 1, WHOLE, "Member.number"); // Its own, as long as its session goes on.
+  text(m.name, 1, 100, "Member.name"); // No two have the same.
+  word(m.role, ROLE, "Member.role");
+  m.waiting = m.waiting === undefined ? 0 : whole(m.waiting, 0, WHOLE, "Member.waiting"); // Its place in the queue, from 1; 0: it isn't in it.
+  return m;
+}
+
+/** Server: Who is here; the newest one counts. */
+function checkPresent(m) {
+  map(m, "present");
+  if (m.type !== undefined && m.type !== "present") fail("present", "present");
+  m.members = m.members === undefined ? [] : list(m.members, 0, 100, "present.members", checkMember); // Who has the lease comes first, then who waits, in order, then the others.
+  m.others = m.others === undefined ? 0 : whole(m.others, 0, WHOLE, "present.others"); // So many more are here.
+  m.holder = m.holder === undefined ? 0 : whole(m.holder, 0, WHOLE, "present.holder"); // Number of who has the lease; 0: nobody of them.
+  m.offered = m.offered === undefined ? 0 : whole(m.offered, 0, WHOLE, "present.offered"); // Number of who it's offered to; 0: nobody.
+  m.offered_until = m.offered_until === undefined || m.offered_until === null ? null : real(m.offered_until, -1e9, 1e9, "present.offered_until"); // The offer stands until then [s].
+  m.answers = m.answers === undefined || m.answers === null ? null : whole(m.answers, 1, WHOLE, "present.answers"); // Number of the receiver's request that this answers.
   return m;
 }
 
@@ -605,6 +631,7 @@ const CHECKS = new Map([
   ["state", checkState],
   ["network", checkNetwork],
   ["corrected", checkCorrected],
+  ["present", checkPresent],
   ["mobile-welcome", checkMobileWelcome],
   ["postures", checkPostures],
   ["tasks", checkTasks],

@@ -181,9 +181,10 @@ def explained(word: str) -> Iterator[Word]:
         if upper in words:
             yield Word(upper, words[upper], kind, upper)
     if upper in forms.IGNORED and upper not in COMMANDS:
-        why = forms.UNAVAILABLE.get(upper)
-        passed = "It's recognised in programs, and passed over: it has no meaning here."
-        yield Word(upper, passed if why is None else f"It isn't available: {why}.", "instruction", upper, "V+")
+        passed = upper in forms.PASSED
+        said = "It's recognised in programs, and passed over" if passed else "It isn't available"
+        why = forms.PASSED[upper] if passed else forms.UNAVAILABLE[upper]
+        yield Word(upper, f"{said}: {why}.", "instruction", upper, "V+")
 
 
 def help_(state: TerminalState, rest: str) -> None:

@@ -9,11 +9,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from interfaces.val2 import forms
 from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, integer, named, pieces, unique
+from interfaces.val2.rows import numbered
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 from interfaces.val2.syntax import BLANK, Expression, Instruction, Step
 
@@ -59,14 +59,14 @@ def at(state: TerminalState, rest: str) -> None:
 def execute(state: TerminalState, rest: str, *, usual: int = 0) -> None:
     """EXECUTE task program(arguments), cycles, step; PCEXECUTE."""
     given = _TASK.match(rest)
-    number = usual if given is None else state.controller.task_number(int(given[1]))
+    number = usual if given is None else numbered("task", int(given[1]))
     name, arguments, cycles, step = _program(state, rest if given is None else rest[given.end() :])
     state.controller.execute(name, arguments, cycles=cycles, step=step, number=number, now=state.now)
 
 
 def of_task(state: TerminalState, rest: str, *, do: Callable[..., None], usual: int = 0) -> None:
     """PROCEED, RETRY, KILL, DONE, and their like of process control: of the task that's given, or the usual one."""
-    do(state.controller, state.controller.task_number(integer(rest, usual, "a task")), now=state.now)
+    do(state.controller, numbered("task", integer(rest, usual, "a task")), now=state.now)
 
 
 def xstep(state: TerminalState, rest: str) -> None:
@@ -210,11 +210,7 @@ def parameter(state: TerminalState, rest: str) -> None:
         return
     if not given or len(names) != 1:
         raise ValError("Invalid argument", "PARAMETER name = value")
-    wanted, row = state.number(value), forms.PARAMETERS.get(names[0])
-    if row is not None and not row.low <= wanted <= row.high:
-        allowed = f"{layout.number(row.low)} to {layout.number(row.high)} {row.unit}"
-        raise ValError("Invalid argument", f"{names[0]} is {allowed}")
-    parameters[names[0]] = wanted
+    state.controller.parameter(names[0], state.number(value))
 
 
 def speed(state: TerminalState, rest: str) -> None:
@@ -253,11 +249,9 @@ def channel(state: TerminalState, rest: str, *, word: str) -> None:
     """ADC, DAC, IOGET, IOPUT: simulated channels; what programs read, and what they have set."""
     known, (given, value) = state.controller.channels[word], halves(rest)
     if value is not None:
-        known[state.controller.channel(state.number(given))] = state.number(value)
+        known[numbered("channel", state.number(given))] = state.number(value)
         return
-    shown = (
-        [state.controller.channel(state.number(given))] if given else [n for n in known if known[n]] or [*known][:1]
-    )
+    shown = [numbered("channel", state.number(given))] if given else [n for n in known if known[n]] or [*known][:1]
     state.say(*layout.table([(f"{word} {n}", f"= {layout.number(known[n])}") for n in shown]))
 
 

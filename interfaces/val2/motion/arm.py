@@ -33,6 +33,7 @@ from interfaces.val2.motion.places import (
 )
 from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
+from interfaces.val2.rows import numbered
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
 from vrs.commands import Alter, Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
 from vrs.engine import Engine
@@ -391,8 +392,7 @@ class Arm(SettingsInForce):
 
     def drive(self, joint: int, change: float, speed: float, *, now: float) -> None:
         """DRIVE: turn a joint, 1 to 6, by a change [deg] at a speed [%]."""
-        if joint not in range(1, 7):
-            raise ValError("Illegal joint number", f"{joint}: 1 to 6")
+        numbered("joint", joint)
         require(0 < speed < math.inf, speed, "a speed is above 0 %")
         joints = list(self.destination(now=now).joints.joints)
         joints[joint - 1] += change
@@ -491,9 +491,12 @@ class Arm(SettingsInForce):
 
     def altering(self, channel: int, *, now: float) -> bool:
         """Whether the path is altered by corrections that come on a channel."""
+        return self.altered_since(now=now) is not None and self._alterations.channel == channel
+
+    def altered_since(self, *, now: float) -> float | None:
+        """Since when the path is altered [s]; None while it isn't."""
         self.renew(now=now)
-        alterations = self._alterations
-        return alterations.mode is not None and not self._over(self._now) and alterations.channel == channel
+        return None if self._alterations.mode is None or self._over(self._now) else self._alterations.since
 
     def _move(
         self,
@@ -709,7 +712,7 @@ class Arm(SettingsInForce):
             return
         if alterations.on_way is not None:
             self._keep(now)
-        alterations.set(mode, channel)
+        alterations.set(mode, channel, self._now)
 
     def begin_program(self) -> None:
         """EXECUTE: speeds, tolerances and requests are as at the beginning."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Final
@@ -209,6 +210,8 @@ class Alterations:
         """None while the path isn't altered."""
         self.channel = 0
         """By which corrections come from elsewhere."""
+        self.since = -math.inf
+        """When ALTER was said [s]."""
         self._nominal: Transformation | None = None
         """Where the tool would be without corrections."""
         self._newest: Transformation | None = None
@@ -218,7 +221,7 @@ class Alterations:
         self.ends = False
         """Whether it's over when the arm stands."""
 
-    def set(self, mode: int | None, channel: int = 0) -> None:
+    def set(self, mode: int | None, channel: int = 0, since: float = -math.inf) -> None:
         """Begin, or end with None.
 
         Raises:
@@ -227,7 +230,7 @@ class Alterations:
         if mode is not None and mode not in MODES:
             detail = f"mode {mode}: {MODES[0]} to {MODES[-1]}; 1 is cumulative, 2 along world axes, 3 both"
             raise ValError("Illegal value", detail)
-        self.mode, self.channel, self.ends = mode, channel, False
+        self.mode, self.channel, self.since, self.ends = mode, channel, since, False
         self._nominal = self._newest = self.on_way = None
 
     @property

@@ -207,7 +207,7 @@ def test_a_field_that_is_added_is_in_the_documents_table(newer: Any) -> None:
 def test_a_documents_tables_say_who_may_send_what_and_what_words_mean() -> None:
     text = "<!-- roles -->\n<!-- end -->\n<!-- words: ProblemCode -->\n<!-- end -->"
     found = generate.document(text, generate.messages())
-    assert "\n| `admin` | the same, and `take-over` |\n\n<!-- end -->" in found
+    assert "\n| `admin` | the same, and `take-over`, `give-control` |\n\n<!-- end -->" in found
     assert "\n| `version` | No common version of the protocol |\n" in found
     with pytest.raises(KeyError, match="warp"):
         generate.document("<!-- fields: warp -->\n<!-- end -->", generate.messages())
@@ -362,6 +362,12 @@ def test_roles_and_what_a_server_takes_follow_from_the_messages() -> None:
     assert {kind.sender for kind in KINDS} <= set(Party)  # type: ignore[attr-defined]
     may = {role: {kind for kind in KINDS if kind in sent_by(role).__args__} for role in Role}
     assert may[Role.VIEWER] < may[Role.OPERATOR] < may[Role.ADMIN]
-    assert may[Role.ADMIN] - may[Role.OPERATOR] == {control.TakeOver}
+    assert may[Role.ADMIN] - may[Role.OPERATOR] == {control.TakeOver, control.GiveControl}
     assert control.Hello not in may[Role.ADMIN]
-    assert not may[Role.VIEWER] & {control.Acquire, control.Impair, control.Beat}
+    assert not may[Role.VIEWER] & {
+        control.Acquire,
+        control.Impair,
+        control.Beat,
+        control.RequestControl,
+        control.Withdraw,
+    }

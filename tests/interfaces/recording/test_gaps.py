@@ -12,7 +12,7 @@ from interfaces.recording.figures import figures, summary
 from interfaces.recording.recording import open_recording
 from interfaces.recording.track import REAL
 from interfaces.report.html import render
-from interfaces.report.tables import time_lines
+from interfaces.report.tables import rich_tables
 from tests.interfaces.recording.driven import HOME, MODEL, Driven
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.comparison import agreement, compare_paths
@@ -136,7 +136,10 @@ def test_a_gap_is_told_and_nothing_in_it_is_scored(tmp_path):
         assert value["path"]["path_error_max"] <= 1.1 * expected["path"][1] + 1e-5
         assert value["errors"]["timeline_time"]["joint_max_deg"] <= list(1.1 * expected["joint_max"] + 1e-5)
         assert any("samples of the real robot for 2.0 s" in line for line in value["missing"])
-        assert any("wasn't measured for 2.0 s" in line for line in time_lines(value))
+        first = next(iter(rich_tables(value)))
+        assert str(first.caption).startswith(
+            "What happened while the real robot wasn't measured is in no figure. (2.0"
+        )
         assert "<li><span>not measured</span>2.0 s</li>" in render(found.run, value)
 
 

@@ -11,9 +11,9 @@ import interfaces.station
 from interfaces.station.panels import PANELS, Offer, Panel, panels_of
 from vrs.errors import InvalidValueError
 
-ARM = """pane drag link control theme stop jog receipts plots terminal network record strip hints"""
+ARM = """pane drag link control theme hints stop jog receipts plots terminal network record strip"""
 STATIC = Path(interfaces.station.__file__).parent / "static"
-BASE = """floor link control theme stop drive map jobs camera plots network record hints"""
+BASE = """floor link control theme hints stop drive map jobs camera plots network record"""
 
 
 def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:

@@ -222,6 +222,23 @@ def values() -> dict[str, Any]:
         "lease held by another": c.Lease(LeaseState.HELD, None, "Ada"),
         "lease shared by the receiver": c.Lease(LeaseState.HELD, 7_730_941_132_801, "Ada", answers=5, shared=True),
         "lease ending": c.Lease(LeaseState.ENDING, answers=4, ended=LeaseEnd.TAKEN_OVER),
+        "lease of one that waits": c.Lease(LeaseState.HELD, None, "Ada", answers=7, member=9, waiting=3),
+        "lease that is offered": c.Lease(
+            LeaseState.FREE, ended=LeaseEnd.RELEASED, member=7, waiting=1, offered_until=73.25
+        ),
+        "request control": c.RequestControl(7),
+        "withdraw": c.Withdraw(8),
+        "withdraw another one": c.Withdraw(9, 12),
+        "give control": c.GiveControl(10, 12),
+        "who": c.Who(11),
+        "present": c.Present(
+            (
+                c.Member(3, "Bo", c.Role.OPERATOR), c.Member(7, "Ada", c.Role.OPERATOR, 1),
+                c.Member(12, "Eve 2", c.Role.VIEWER),
+            ),
+            2, 3, 7, 73.25, 11,
+        ),
+        "present: nobody": c.Present(),
         "problem": c.Problem(c.ProblemCode.STALE_EPOCH, "the lease has ended", 5),
         "state": c.State(31, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7_730_941_132_801, True, "", 2),
         "state of a halted robot": c.State(32, 2.5, Q, 2.0, 0.0, -0.5, 0.2, 0, False, "following error", 2),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 
 from interfaces.engine_server.site import Site
-from interfaces.stream.access import Access, hosts
+from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.hub import Hub, HubConfig
 from interfaces.stream.server import HubServer, application
 from interfaces.stream.sockets import bind, serve
@@ -40,10 +40,12 @@ class Robot:
         return self.refusal
 
 
-def make_hub(*, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, **options) -> Hub:
+def make_hub(
+    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, **options
+) -> Hub:
     site = Site(Engine(MODEL, q=HOME, clock=ManualClock(now)))
     robot = Robot(stops)
-    access = Access({"admin": ADMIN})
+    access = Access({"admin": ADMIN}, free=OPEN if invitations is None else (), invitations=invitations)
     counter = iter(range(1, 10**9))
     hub = Hub(
         site,

@@ -29,6 +29,7 @@ LAST = {
     "09_speeds": "s\n",
     "10_alter": "it rose by  5.00 mm, and ended  0.00 mm from b\n",
     "11_tasks": "parts so far\n",
+    "12_corrections": "from  0.00 to  0.00 mm off the line\n",
 }
 """How what they TYPE ends."""
 

@@ -194,7 +194,7 @@ def test_heads_ends_and_line_ends(ends, head, last):
 
 
 def test_what_has_no_meaning_is_kept_as_it_is_written():
-    assert statement('FCMND (lun, 4) "SERIAL:1" ;x') == Instruction("FCMND", passed='(lun, 4) "SERIAL:1"')
+    assert statement('FSET (lun, 4) "SERIAL:1" ;x') == Instruction("FSET", passed='(lun, 4) "SERIAL:1"')
     assert statement("weave 3,1") == Instruction("WEAVE", passed="3,1")
     assert statement("PARAMETER not.ours = 3") == Instruction("PARAMETER", passed="not.ours = 3")
     assert all(statement(keyword).passed is not None for keyword in forms.IGNORED)

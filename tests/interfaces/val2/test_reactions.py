@@ -77,7 +77,7 @@ def test_a_lock_ends_with_the_reaction_that_it_was_said_in_and_with_the_program(
     more = ["REACT 1001, first", "REACT 1002, alarm", "WAIT.EVENT , 3", "LOCK 1"]
     rig.run(body(*more) + ALARM + locking + at(1.0, (2.0, 1002)))
     assert times(rig) == [1.0, pytest.approx(2.0, abs=1e-2)]
-    assert not rig.controller.reactions.locked
+    assert rig.controller.reactions.priority == 0
 
 
 def test_a_priority_isnt_negative() -> None:
@@ -119,13 +119,13 @@ def test_what_turned_waits_once_and_is_forgotten_with_ignore() -> None:
     watched.add(Reaction(1001, "alarm", immediate=False, always=True))
     for on in (True, False, True):
         watched.notice(1001, on)
-    due = watched.due(0)
+    due = watched.due()
     assert due is not None
     assert due.program == "alarm"
-    assert watched.due(0) is None
+    assert watched.due() is None
     watched.notice(1001, on=True)
     watched.ignore(-1001)
-    assert watched.due(0) is None
+    assert watched.due() is None
 
 
 def test_a_program_reacts_to_its_own_signals() -> None:
@@ -203,3 +203,77 @@ def test_reactions_end_with_the_program() -> None:
     rig.controller.signals.force(1001)
     rig.advance()
     assert "brake" not in rig.arm.names()
+
+
+def test_a_reaction_waits_for_one_of_a_higher_priority_and_comes_into_one_of_a_lower() -> None:
+    text = (
+        body("REACT 1001, slow, 5", "REACT 1002, alarm, 6", "REACT 1003, last, 4", "WAIT.EVENT , 5", "TYPE 99")
+        + ".PROGRAM slow()\n TYPE 1\n WAIT.EVENT , 2\n TYPE 2\n.END\n.PROGRAM last()\n TYPE 3\n.END\n"
+        + ALARM
+    )
+    rig = Rig()
+    rig.run(text + at(0.5, (1.0, 1003), (1.5, 1002)))
+    assert times(rig) == [1.0, pytest.approx(1.5, abs=1e-3), 2.0, 3.0, 99.0]
+
+
+def test_lock_lets_pass_what_has_a_higher_priority() -> None:
+    rig = Rig()
+    rig.run(body("REACT 1001, alarm, 11", "LOCK 10", "WAIT.EVENT , 2", "TYPE 99") + ALARM + at(1.0))
+    assert times(rig) == [pytest.approx(1.0, abs=1e-3), 99.0]
+
+
+TRAP = ".PROGRAM trap()\n TYPE $ERROR()\n RETURNE\n.END\n"
+
+
+def test_an_error_calls_what_reacte_names_and_the_program_goes_on_with_the_next_step() -> None:
+    rig = Rig()
+    rig.run(body("REACTE trap", "x = 1 / 0", "n = missing", "CALL other()", "TYPE 99") + TRAP
+            + ".PROGRAM other()\n SIGNAL 3000\n TYPE 98\n.END\n")  # fmt: skip
+    assert rig.typed().splitlines() == [
+        "*Division by zero*", "*Undefined value* missing",
+        "*Illegal digital signal* 3000; allowed: 1 to 512, 2001 to 2512", " 98", " 99",
+    ]  # fmt: skip
+
+
+def test_a_place_out_of_reach_is_an_error_that_reacte_knows() -> None:
+    rig = Rig()
+    rig.run(body("REACTE trap", "PARAMETER VPLUS = 2", "MOVE TRANS(1)", "BREAK", "TYPE DX(HERE)") + TRAP)
+    assert rig.typed().splitlines() == ["*Illegal value* 2; allowed: VPLUS of 0 to 1", " 1"]
+
+
+def test_reactions_wait_for_what_reacte_calls() -> None:
+    rig = Rig()
+    slow = ".PROGRAM trap()\n TYPE 1\n WAIT.EVENT , 2\n TYPE 2\n.END\n"
+    rig.run(body("REACTE trap", "REACTI 1001, alarm, 200", "x = missing", "TYPE 99") + slow + ALARM + at(1.0))
+    assert times(rig) == [1.0, 2.0, pytest.approx(2.0, abs=1e-2), 99.0]
+
+
+@pytest.mark.parametrize("ends", ["REACTE", "LOCK 254"])
+def test_without_reacte_an_error_stops_the_program_again(ends: str) -> None:
+    rig = Rig()
+    with pytest.raises(ValError, match=r"\*Undefined value\* missing, program main, step 4"):
+        rig.run(body("REACTE trap", "n = missing", ends, "n = missing") + TRAP)
+    assert rig.typed() == "*Undefined value* missing\n"
+
+
+def test_an_error_in_what_reacte_calls_stops_the_program() -> None:
+    rig = Rig()
+    with pytest.raises(ValError, match=r"\*Undefined value\* x, program trap, step 1"):
+        rig.run(body("REACTE trap", "n = missing") + ".PROGRAM trap()\n TYPE x\n.END\n")
+    assert rig.controller.status().stack == (("main", 2), ("trap", 1))
+
+
+def test_errors_without_end_leave_room_for_others() -> None:
+    rig = Rig()
+    rig.run(body("REACTE trap", "10 n = missing", "IF TIMER(1) < 1 GOTO 10", "TYPE 99")
+            + ".PROGRAM trap()\n.END\n")  # fmt: skip
+    assert times(rig) == [99.0]
+    assert rig.now == pytest.approx(1.0, abs=0.01)
+
+
+def test_each_task_has_a_reacte_of_its_own() -> None:
+    rig = Rig()
+    other = ".PROGRAM beside()\n REACTE trap\n n = missing\n TYPE 98\n.END\n"
+    with pytest.raises(ValError, match=r"\*Undefined value\* more, program main, step 3"):
+        rig.run(body("EXECUTE 2 beside()", "WAIT TASK(1, 2) == 1", "n = more") + other + TRAP)
+    assert rig.typed() == "*Undefined value* missing\n 98\n"

@@ -32,6 +32,9 @@ def test_a_program_writes_a_file_and_reads_it_again(tmp_path: Path) -> None:
     assert said == [
         "*Device not ready*\n",
         "part  7 3 4.5 -504\n",
+        "3, 4.5|log     .txt       1                          |\n",
+        "*Device not ready*\n",
+        "*Invalid file specification*\n",
         " -7 2.5\n",
         "done\n",
     ]
@@ -83,6 +86,34 @@ def test_iostat_says_why_something_couldnt_be_done(tmp_path: Path) -> None:
     units.open("FOPENR", 5, "there.txt")
     assert units.status(5) == -516
     assert units.status(6) == -516
+
+
+def test_a_directory_is_read_like_a_file_and_a_file_from_any_line(tmp_path: Path) -> None:
+    for name, size in (("b.txt", 513), ("A.v2", 0), ("verylongname.lc", 5)):
+        (tmp_path / name).write_text("x" * size)
+    (tmp_path / "folder").mkdir()
+    units = Units(tmp_path)
+    units.attach(5, "DISK")
+    for pattern in ("", "*.*", "C:\\*"):
+        units.open("FOPEND", 5, pattern)
+        assert [units.read(5) for _ in range(4)] == [
+            f"A       .v2        0{'':26}",
+            f"b       .txt       2{'':26}",
+            f"verylongname.lc        1{'':26}",
+            None,
+        ]
+    units.open("FOPEND", 5, "*.TXT")
+    assert (units.read(5) or "").split() == ["b", ".txt", "2"]
+    units.write(5, "x")
+    assert units.status(5) == -513
+    (tmp_path / "b.txt").write_text("one\ntwo\nthree\n")
+    units.open("FOPENR", 5, "b.txt")
+    for line, status, then in ((3, 1, "three"), (1, 1, "one"), (4, -504, "two")):
+        units.seek(5, line)
+        assert units.status(5) == status
+        assert units.read(5) == then
+    units.seek(6, 1)
+    assert units.status(6) == -513
 
 
 def test_a_line_that_isnt_what_was_wanted_leaves_variables_alone(tmp_path: Path) -> None:
