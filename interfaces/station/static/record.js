@@ -1,6 +1,6 @@
 // Recording on the fly, and the list of recordings: replayed alone or side by side, copied, deleted.
 import { sideLink } from "./sidelink.js";
-import { Dialog, html, Icon, observed, useEffect, useMemo, useSignal, useState } from "./ui.js";
+import { html, Icon, observed, useEffect, useMemo, useRef, useSignal, useState } from "./ui.js";
 
 const ALIGNED = { start: "beginnings together", began: "as they happened, by the clock", timeline: "at equal session times" };
 const MOST_CHOSEN = 2;
@@ -123,9 +123,9 @@ export function Panel({ station }) {
     <ul class="recordings" id="recordings" aria-label="Recordings, newest first">${items.map((item) => html`<${Row} key=${item.name} item=${item}
       growing=${growing === item.name} letter=${letter(item.name)} choose=${choose} copy=${() => recordings.copy(item.name)}
       drop=${may && (() => setDoomed(item))} />`)}</ul>
+    ${doomed && html`<${Deletion} key=${doomed.name} item=${doomed} drop=${() => recordings.delete(doomed.name)} close=${() => setDoomed(null)} />`}
     <p class="muted where">${directory && (items.length ? `In ${directory}${more ? `, and ${more} older ones` : ""}` : `None yet in ${directory}`)}</p>
-    <${Choice} chosen=${there} />
-    ${doomed && html`<${Deletion} item=${doomed} drop=${() => recordings.delete(doomed.name)} close=${() => setDoomed(null)} />`}`;
+    <${Choice} chosen=${there} />`;
 }
 
 /** A name, shown before it begins, and the button that begins. */
@@ -181,12 +181,14 @@ function Choice({ chosen }) {
       href=${chosen.length ? `${window.VrsLink.FOLDER}/replay?${query}` : null}><${Icon} name="play_circle" /><span>${OPEN[chosen.length]}</span></a></div>`;
 }
 
-/** Asks before a recording is lost. */
+/** Asks before a recording is lost; beside the list, so that STOP stays within reach. */
 function Deletion({ item, drop, close }) {
-  return html`<${Dialog} class="ask" aria-label="Delete a recording" close=${close}>
-    <p>Delete <b>${plain(item.name)}</b> (${factsOf(item)})? The file is lost for everybody, and can't be brought back.</p>
+  const keep = useRef(null);
+  useEffect(() => keep.current.focus(), []);
+  return html`<div class="deletion" role="alertdialog" aria-label="Delete a recording" onKeyDown=${({ key }) => key === "Escape" && close()}>
+    <p>Delete <b>${plain(item.name)}</b>? The file (${factsOf(item)}) is lost for everybody, and can't be brought back.</p>
     <div class="row">
-      <button class="main" type="button" id="record-delete-yes" onClick=${() => (drop(), close())}>Delete it</button>
-      <button type="button" onClick=${close}>Keep it</button>
-    </div><//>`;
+      <button type="button" id="record-delete-yes" onClick=${() => (drop(), close())}>Delete it</button>
+      <button type="button" ref=${keep} onClick=${close}>Keep it</button>
+    </div></div>`;
 }
