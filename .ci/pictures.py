@@ -56,9 +56,9 @@ def _stationed(browser: Any, given: tuple[str, ...], do: Callable[[Page], None],
     ):
         page.open().take_control()
         page.page.wait_for_timeout(1500)
-        page.page.evaluate("station.shared.pane.scene.pacing.set(0)")
+        page.page.evaluate("station.scene.pacing.set(0)")
         do(page)
-        page.page.evaluate("station.shared.pane.scene.pacing.viewer.set_dirty()")
+        page.page.evaluate("station.scene.pacing.viewer.set_dirty()")
         page.page.wait_for_timeout(400)
         picture: bytes = page.page.screenshot()
         return picture

@@ -14,7 +14,7 @@ from interfaces.messages import recording as m
 from interfaces.recording import RecordingWriter
 from interfaces.recording.channels import Message
 from interfaces.recording.history import edit_entries, whole_entries
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, real_pose, virtual_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, link_transforms, pose_of
 from vrs import Engine, JointTarget, ManualClock, MotionCommand
 from vrs.model import Array
 
@@ -92,8 +92,8 @@ class Teller:
             self._drawn = t
             virtual, real = MODEL.links(tick.q), MODEL.links(tick.measured)
             found += [
-                virtual_pose(t, virtual[-1]),
-                real_pose(t, real[-1]),
+                pose_of("virtual", t, virtual[-1]),
+                pose_of("real", t, real[-1]),
                 link_transforms(t, [("virtual", virtual), ("real", real)]),
             ]
         return found

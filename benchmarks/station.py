@@ -42,7 +42,7 @@ HOLD = "--link-loss", "hold"
 HOME = puma560.model().poses["nominal"]
 READY = "document.getElementById('station')?.dataset.ready === '' && station.session.link === 'live'"
 _TURNS = """() => { const rows = window.turns ??= [];
-const look = () => { const { elements } = station.shared.pane.scene.node('vrs', 'virtual', 'body', '1').matrix;
+const look = () => { const { elements } = station.scene.node('vrs', 'virtual', 'body', '1').matrix;
 rows.push([station.session.now, Math.atan2(elements[1], elements[0])]); requestAnimationFrame(look); };
 requestAnimationFrame(look); }"""
 _LOADED = """() => { const parts = performance.getEntriesByType("resource");
@@ -239,9 +239,9 @@ _DEEDS: tuple[str, ...] = (
     "document.querySelector('[data-pose=ready]').click()",
     "document.querySelector('#tab-receipts').click()",
     "document.querySelector('[data-pose=nominal]').click()",
-    "station.shared.pane.show(station.session.now - 3)",
+    "station.cursor = station.session.now - 3",
     "document.querySelector('#zoom-out').click()",
-    "station.shared.pane.show(null)",
+    "station.cursor = null",
     "document.querySelector('#zoom-in').click()",
     "document.querySelector('#undo').click()",
     "document.querySelector('#tab-jog').click()",

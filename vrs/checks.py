@@ -47,6 +47,24 @@ def finite(name: str, value: object, allowed: str = "a finite number") -> float:
     return number
 
 
+def not_before(name: str, value: object, earliest: float, allowed: str) -> float:
+    """Return a time that doesn't run back [s].
+
+    Args:
+        name: What it's called, for the message.
+        value: To be checked.
+        earliest: The latest so far [s].
+        allowed: What is allowed, in the message; `{}` in it stands for the latest so far.
+
+    Raises:
+        InvalidValueError: If it isn't finite, or lies before the earliest.
+    """
+    now = finite(name, value, "finite seconds")
+    if now < earliest:
+        raise InvalidValueError(name, now, allowed.format(earliest))
+    return now
+
+
 def normal(value: float) -> float:
     """The same number; 0 where it's subnormal."""
     return 0.0 if 0.0 < abs(value) < SMALLEST else value
@@ -100,6 +118,8 @@ def number_in(name: str, value: object, low: float, high: float, what: str = "a 
     Raises:
         InvalidValueError: If it is anything else.
     """
+    if type(value) is float and low <= value <= high and math.isfinite(value):
+        return value
     allowed = f"{what} in [{low:g}, {high:g}]{unit}"
     number = finite(name, value, allowed)
     if not low <= number <= high:

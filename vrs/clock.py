@@ -6,7 +6,7 @@ import math
 import time
 from typing import Protocol
 
-from vrs.checks import finite
+from vrs.checks import finite, not_before
 from vrs.errors import InvalidValueError
 
 
@@ -45,10 +45,7 @@ class ManualClock:
         Raises:
             InvalidValueError: If now lies before the present time.
         """
-        time_ = finite("now", now, "finite seconds")
-        if time_ < self._now:
-            raise InvalidValueError("now", now, f"at or after the present, {self._now} s")
-        self._now = time_
+        self._now = not_before("now", now, self._now, "at or after the present, {} s")
 
 
 class WallClock:

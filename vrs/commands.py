@@ -6,7 +6,9 @@ Stamps are seconds on the timeline of the engine that receives the command.
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
@@ -145,7 +147,14 @@ Target: TypeAlias = JointTarget | PoseTarget
 
 
 class _Command(Record, frozen=True, omit_defaults=True, gc=False, tag_field="type"):
-    """A command, named by its type where it crosses."""
+    """A command, named by its type where it crosses; `_CHECKS` says what its fields may be."""
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            check = _CHECKS.get(name)
+            value = getattr(self, name)
+            if check is not None and (value is not None or name in _NEEDED):
+                set_field(self, name, check(name, value))
 
 
 class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="move"):
@@ -184,19 +193,13 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
     """
 
     def __post_init__(self) -> None:
-        if not isinstance(self.target, (JointTarget, PoseTarget)):
-            raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
-        _check_stamps(self)
+        super().__post_init__()
         for name, least in (("speed", 1e-3), ("pace", 1e-3), ("acceleration", 1e-2)):
             share = normal(finite(name, getattr(self, name), "a number in (0, 1]"))
             if not least <= share <= 1:
                 raise InvalidValueError(name, share, f"a number in (0, 1], at least {least:g} so that it arrives")
             set_field(self, name, _UNCHANGED if share == 1.0 and name != "speed" else share)
         set_field(self, "deviation", _deviation(self.deviation, endless=True))
-        if self.tool is not None:
-            set_field(self, "tool", _transform("tool", self.tool))
-        for name, kind in (("motion", Motion), ("profile", Profile), ("insertion", Insertion)):
-            set_field(self, name, word(name, getattr(self, name), kind))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, MotionCommand) and self._values() == other._values()
@@ -214,10 +217,6 @@ class PositionQuery(_Command, frozen=True, omit_defaults=True, gc=False, tag="qu
 
     t: Time | None = None
     """Timeline time [s]; None: now (offline: the end of the plan)."""
-
-    def __post_init__(self) -> None:
-        if self.t is not None:
-            set_field(self, "t", normal(finite("t", self.t, "None or finite seconds")))
 
 
 class ParameterChange(_Command, frozen=True, omit_defaults=True, gc=False, tag="parameter"):
@@ -242,11 +241,9 @@ class DriveCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="dri
     """Execution time t_exec [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
-        for name in ("v", "w", "duration"):
-            set_field(self, name, normal(number_in(name, getattr(self, name), -LARGEST, LARGEST)))
+        super().__post_init__()
         if self.duration <= 0:
             raise InvalidValueError("duration", self.duration, "positive seconds")
-        _check_stamps(self)
 
 
 class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="steer"):
@@ -266,12 +263,7 @@ class SteerCommand(_Command, frozen=True, omit_defaults=True, gc=False, tag="ste
     def __post_init__(self) -> None:
         if (self.rates is None) == (self.twist is None):
             raise InvalidValueError("steering", (self.rates, self.twist), "either rates or a twist")
-        if self.rates is not None:
-            set_field(self, "rates", _joints("rates", self.rates, "finite joint rates [rad/s], shape (n,)"))
-        if self.twist is not None:
-            set_field(self, "twist", sized_array("twist", self.twist, (6,), "six finite numbers (v, w)"))
-        set_field(self, "frame", word("frame", self.frame, Frame))
-        _check_stamps(self)
+        super().__post_init__()
 
 
 class Retime(_Command, frozen=True, omit_defaults=True, gc=False, tag="retime"):
@@ -283,9 +275,8 @@ class Retime(_Command, frozen=True, omit_defaults=True, gc=False, tag="retime"):
     issued_at: Time | None = None
 
     def __post_init__(self) -> None:
-        _check_id(self)
-        set_field(self, "execute_at", normal(finite("execute_at", self.execute_at, "finite seconds")))
-        _check_stamps(self)
+        finite("execute_at", self.execute_at, "finite seconds")
+        super().__post_init__()
 
 
 class Cancel(_Command, frozen=True, omit_defaults=True, gc=False, tag="cancel"):
@@ -295,10 +286,6 @@ class Cancel(_Command, frozen=True, omit_defaults=True, gc=False, tag="cancel"):
     issued_at: Time | None = None
     execute_at: Time | None = None
     """When [s]; None: as soon as possible."""
-
-    def __post_init__(self) -> None:
-        _check_id(self)
-        _check_stamps(self)
 
 
 class InsertVia(_Command, frozen=True, omit_defaults=True, gc=False, tag="via"):
@@ -313,11 +300,8 @@ class InsertVia(_Command, frozen=True, omit_defaults=True, gc=False, tag="via"):
     """When a move under way turns to the via [s]; None: as soon as possible."""
 
     def __post_init__(self) -> None:
-        _check_id(self)
-        if not isinstance(self.target, (JointTarget, PoseTarget)):
-            raise InvalidValueError("target", self.target, "a JointTarget or a PoseTarget")
+        super().__post_init__()
         set_field(self, "deviation", _deviation(self.deviation))
-        _check_stamps(self)
 
 
 class ScaleTime(_Command, frozen=True, omit_defaults=True, gc=False, tag="scale"):
@@ -329,10 +313,6 @@ class ScaleTime(_Command, frozen=True, omit_defaults=True, gc=False, tag="scale"
     execute_at: Time | None = None
     """When it begins [s]; None: as soon as possible (offline: the start of the timeline)."""
 
-    def __post_init__(self) -> None:
-        set_field(self, "factor", number_in("factor", self.factor, 1e-3, 1e3))
-        _check_stamps(self)
-
 
 class Stop(_Command, frozen=True, omit_defaults=True, gc=False, tag="stop"):
     """Stop along the present motion as fast as the limits allow, and drop what is scheduled."""
@@ -340,9 +320,6 @@ class Stop(_Command, frozen=True, omit_defaults=True, gc=False, tag="stop"):
     issued_at: Time | None = None
     execute_at: Time | None = None
     """When [s]; None: as soon as possible. A late stop stops at once, whatever the lateness policy."""
-
-    def __post_init__(self) -> None:
-        _check_stamps(self)
 
 
 class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
@@ -352,8 +329,9 @@ class Resume(_Command, frozen=True, omit_defaults=True, gc=False, tag="resume"):
     execute_at: Time | None = None
     """When [s]; None: as soon as possible."""
 
-    def __post_init__(self) -> None:
-        _check_stamps(self)
+
+class Redo(_Command, frozen=True, omit_defaults=True, gc=False, tag="redo"):
+    """Take back the newest undo: the plan is again what it was, unless something else was commanded since."""
 
 
 class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="alter"):
@@ -379,15 +357,6 @@ class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
     execute_at: Time | None = None
     """When the path begins to change [s]; None: as soon as possible."""
 
-    def __post_init__(self) -> None:
-        if self.offset is not None:
-            allowed = "a translation [m] and a rotation vector [rad], (6,)"
-            set_field(self, "offset", sized_array("offset", self.offset, (6,), allowed))
-        if self.tool is not None:
-            set_field(self, "tool", _transform("tool", self.tool))
-        set_field(self, "frame", word("frame", self.frame, Frame))
-        _check_stamps(self)
-
 
 PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume | Alter
 """Edits of what is scheduled."""
@@ -400,11 +369,16 @@ def _joints(name: str, value: ArrayLike, allowed: str) -> Array:
     return array
 
 
-def _check_id(command: Retime | Cancel | InsertVia) -> None:
-    number = command.command_id
-    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 1:
-        raise InvalidValueError("command_id", number, "a command's id, an integer from 1")
-    set_field(command, "command_id", int(number))
+def _command_id(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InvalidValueError(name, value, "a command's id, an integer from 1")
+    return int(value)
+
+
+def _target(name: str, value: object) -> object:
+    if not isinstance(value, (JointTarget, PoseTarget)):
+        raise InvalidValueError(name, value, "a JointTarget or a PoseTarget")
+    return value
 
 
 def _deviation(value: object, *, endless: bool = False) -> float:
@@ -423,17 +397,45 @@ def _transform(name: str, value: ArrayLike) -> Array:
     return array
 
 
-def _check_stamps(command: MotionCommand | DriveCommand | SteerCommand | PlanEdit) -> None:
-    for name in ("issued_at", "execute_at"):
-        value = getattr(command, name)
-        if value is not None:
-            stamp = normal(finite(name, value, "None or finite seconds"))
-            if abs(stamp) > LARGEST:
-                raise InvalidValueError(name, value, "within ±1e9 s: times count from the session's origin")
-            set_field(command, name, stamp)
+def _seconds(name: str, value: object) -> float:
+    return normal(finite(name, value, "None or finite seconds"))
 
 
-Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | PositionQuery | ParameterChange
+def _stamp(name: str, value: object) -> float:
+    stamp = _seconds(name, value)
+    if abs(stamp) > LARGEST:
+        raise InvalidValueError(name, value, "within ±1e9 s: times count from the session's origin")
+    return stamp
+
+
+def _large(name: str, value: object) -> float:
+    return normal(number_in(name, value, -LARGEST, LARGEST))
+
+
+_CHECKS: dict[str, Callable[[str, Any], object]] = {
+    "target": _target,
+    "command_id": _command_id,
+    "issued_at": _stamp,
+    "execute_at": _stamp,
+    "t": _seconds,
+    "motion": partial(word, kind=Motion),
+    "profile": partial(word, kind=Profile),
+    "insertion": partial(word, kind=Insertion),
+    "frame": partial(word, kind=Frame),
+    "tool": _transform,
+    "factor": partial(number_in, low=1e-3, high=1e3),
+    "v": _large,
+    "w": _large,
+    "duration": _large,
+    "rates": partial(_joints, allowed="finite joint rates [rad/s], shape (n,)"),
+    "twist": partial(sized_array, shape=(6,), allowed="six finite numbers (v, w)"),
+    "offset": partial(sized_array, shape=(6,), allowed="a translation [m] and a rotation vector [rad], (6,)"),
+}
+"""What the fields of commands may be, by name; None passes where a command may leave them out."""
+_NEEDED = frozenset(_CHECKS) - {"issued_at", "execute_at", "t", "tool", "rates", "twist", "offset"}
+
+
+Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | Redo | PositionQuery | ParameterChange
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
+from typing_extensions import override
 
 from vrs.archive import Keeper
 from vrs.checks import finite, finite_array, word
@@ -24,15 +25,13 @@ from vrs.commands import (
     DriveCommand,
     InsertVia,
     Lateness,
-    MotionCommand,
     ParameterChange,
-    PlanEdit,
     Position,
     PositionQuery,
+    Redo,
     Resume,
     Retime,
     ScaleTime,
-    SteerCommand,
     Stop,
     Target,
 )
@@ -41,7 +40,7 @@ from vrs.ledger import Ledger, Receipt
 from vrs.model import Array, Limits, RobotModel, frozen_array, home
 from vrs.moves import check
 from vrs.notes import Notes
-from vrs.scheduler import Scheduler
+from vrs.scheduler import Edited, Scheduler
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -189,7 +188,7 @@ class Engine:
         return self.model.links(self.joints(t))
 
     @overload
-    def execute(self, command: MotionCommand | SteerCommand | PlanEdit) -> Receipt: ...
+    def execute(self, command: Edited | Redo) -> Receipt: ...
     @overload
     def execute(self, command: PositionQuery) -> Position: ...
     @overload
@@ -209,20 +208,25 @@ class Engine:
             InvalidValueError: If the command's form doesn't fit the robot; nothing is changed.
             UnknownCommandError: If it names a command that this engine gave no receipt of.
         """
-        checked = check(command, self.model)
+        checked = self._checked(command)
         if isinstance(checked, PositionQuery):
-            t = self.now() if checked.t is None else checked.t
-            q = frozen_array(self.joints(t))
-            return Position(t, q, frozen_array(self.model.forward(q)))
+            return self._position(self.now() if checked.t is None else checked.t)
         with self.atomic():
-            if isinstance(checked, MotionCommand):
-                return self.scheduler.move(checked, self._present())
             if isinstance(checked, ParameterChange):
                 self._set_parameter(checked)
                 return None
-            if isinstance(checked, SteerCommand):
-                return self.scheduler.steer(checked, self._present())
-            return self.scheduler.edit(checked, self._present())
+            if isinstance(checked, Redo):
+                return self.scheduler.redo(self._present())
+            return self.scheduler.execute(checked, self._present())
+
+    def _checked(self, command: object) -> Edited | Redo | PositionQuery | ParameterChange:
+        """The command, of a form that fits the robot."""
+        return check(command, self.model)
+
+    def _position(self, t: float) -> Position:
+        """The answer to a query about a time [s]."""
+        q = frozen_array(self.joints(t))
+        return Position(t, q, frozen_array(self.model.forward(q)))
 
     def atomic(self) -> AbstractContextManager[None]:
         """Put timeline, receipts and parameters back as they were, if what is done meanwhile raises.
@@ -332,8 +336,19 @@ class Engine:
         """Why `undo` takes nothing back now; empty where it does, or where nothing was ever commanded."""
         return self.scheduler.undo_refusal(self._present())
 
+    def redo(self) -> Receipt:
+        """Take back the newest undo: the plan is again what it was before, as far as nothing of it has passed.
+
+        Returns:
+            The receipt of the command that was undone, as it is now; or a rejection: nothing was undone, or
+            something was commanded since.
+        """
+        return self.execute(Redo())
+
     def _set_parameter(self, change: ParameterChange) -> None:
         plan = self.scheduler
+        # What was planned keeps the limits of then.
+        plan.ledger.redo_steps.clear()
         if change.name == "lateness":
             plan.lateness = word("lateness", change.value, Lateness)
             return
@@ -357,7 +372,13 @@ class Engine:
 class MobileEngine(Engine):
     """A virtual mobile robot: `Engine(model, posture=...)` makes one.
 
-    It takes `DriveCommand`, `Stop`, `PositionQuery` and `ParameterChange`. What is about joints raises.
+    It takes `DriveCommand`, `Stop`, `PositionQuery` and `ParameterChange`; a position's q is the posture, (3,), its
+    X the robot's pose in the world frame. What is about joints raises.
+
+    A drive command without an execution time begins at the end of what is planned, or now if that's past. One
+    within the plan replaces what is left of the command that it interrupts; the commands after that keep their
+    speeds and durations, are shifted as a whole by one Δ ≥ 0, and go on from where the robot then is. One whose
+    speeds pass the limits is rejected.
     """
 
     model: MobileModel  # type: ignore[assignment]
@@ -428,45 +449,17 @@ class MobileEngine(Engine):
         """
         return self.scheduler.timeline.sample(self.now() if t is None else t)
 
-    @overload  # type: ignore[override]
-    def execute(self, command: DriveCommand | Stop) -> Receipt: ...
-    @overload
-    def execute(self, command: PositionQuery) -> Position: ...
-    @overload
-    def execute(self, command: ParameterChange) -> None: ...
-    def execute(self, command: object) -> Receipt | Position | None:
-        """Carry out a command: a drive command or a stop is f, a position query is g.
-
-        A drive command without an execution time begins at the end of what is planned, or now if that's past. One
-        within the plan replaces what is left of the command that it interrupts; the commands after that keep their
-        speeds and durations, are shifted as a whole by one Δ ≥ 0, and go on from where the robot then is.
-
-        Args:
-            command: A DriveCommand, Stop, PositionQuery or ParameterChange; stamps are in this engine's time.
-
-        Returns:
-            A Receipt; a Position, whose q is the posture, (3,), and X the robot's pose in the world frame; or
-            nothing for a parameter change. What can't be, speeds past the limits among it, is a receipt with
-            Status.REJECTED and the reason; the timeline is then untouched.
-
-        Raises:
-            InvalidValueError: If it's no command for a mobile robot; nothing is changed.
-        """
-        if isinstance(command, DriveCommand):
-            with self.atomic():
-                return self.scheduler.drive(command, self._present())
-        if isinstance(command, Stop):
-            with self.atomic():
-                return self.scheduler.stop(command, self._present())
-        if isinstance(command, PositionQuery):
-            t = self.now() if command.t is None else command.t
-            posture = frozen_array(self.posture(t))
-            return Position(t, posture, frozen_array(_pose(*posture.tolist())))
-        if isinstance(command, ParameterChange):
-            self._set_parameter(command)
-            return None
+    @override
+    def _checked(self, command: object) -> Edited | PositionQuery | ParameterChange:
+        if isinstance(command, (DriveCommand, Stop, PositionQuery, ParameterChange)):
+            return command
         allowed = f"a DriveCommand, Stop, PositionQuery or ParameterChange: {self.model.name} has wheels, no joints"
         raise InvalidValueError("command", command, allowed)
+
+    @override
+    def _position(self, t: float) -> Position:
+        posture = frozen_array(self.posture(t))
+        return Position(t, posture, frozen_array(_pose(*posture.tolist())))
 
     def _limit(self, change: ParameterChange) -> float:
         return finite(change.name, change.value, "a positive number")

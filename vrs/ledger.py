@@ -189,6 +189,10 @@ class Ledger(Generic[_TimelineT]):
         """Holds: when each ended [s], and its command's id."""
         self.undo_steps: deque[Undo[_TimelineT]] = deque(maxlen=UNDO_DEPTH)
         """What takes the last edits back, the newest last."""
+        self.redo_steps: list[tuple[Undo[_TimelineT], Undo[_TimelineT]]] = []
+        """What was taken back, and what brings that back, the newest last."""
+        self.redo_version = 0
+        """Version of the timeline to which they belong: any edit makes it the past."""
         self.settled = ""
         """Why edits before the newest ones can't be taken back any more; empty where all can."""
 
@@ -199,11 +203,13 @@ class Ledger(Generic[_TimelineT]):
             yield
             return
         saved = self.newest, self.stills[:], self.undo_steps.copy(), self.settled
+        redo = self.redo_steps[:], self.redo_version
         self._restore = []
         try:
             yield
         except BaseException:
             self.newest, self.stills, self.undo_steps, self.settled = saved
+            self.redo_steps, self.redo_version = redo
             while self._restore:
                 self._restore.pop()()
             raise
@@ -417,26 +423,61 @@ class Ledger(Generic[_TimelineT]):
         """The newest edit that can be taken back."""
         return self.undo_steps[-1] if self.undo_steps else None
 
-    def take_back(self, version: int) -> Receipt:
+    def take_back(self, version: int, taken: _TimelineT | None = None) -> Receipt:
         """Forget the newest edit; its own command's receipt says that it's undone.
 
         Args:
             version: Version of the timeline that the undoing makes.
+            taken: The timeline before that, to be redone; None where it can't be.
         """
         undo = self.undo_steps.pop()
         mine, command = self.receipt(undo.command_id), self.command(undo.command_id)
-        self._write_log(*undo.changes)
-        for first, stills in undo.stills:
-            self.stills[first:] = stills
-        for entry in undo.overwritten.values():
-            if entry is not None:
-                self._set(entry)
+        back = self._put_back(undo)
+        if taken is not None:
+            if self.redo_version != taken.version:
+                self.redo_steps.clear()
+            self.redo_steps.append((undo, back._replace(before=taken)))
+            self.redo_version = version
         if undo.overwritten[undo.command_id] is not None:
             return self.receipt(undo.command_id)
         notes = (Note(NoteCode.UNDONE),)
         mine = replace(mine, reason=text_of(notes), version=version, undone=True)
         self._set(LedgerEntry(mine, command, notes))
         return mine
+
+    def undone(self, version: int) -> Undo[_TimelineT] | None:
+        """What brings back the newest edit that was taken back; None where there's none, or a later edit.
+
+        Args:
+            version: Of the timeline as it is.
+        """
+        return self.redo_steps[-1][1] if self.redo_steps and self.redo_version == version else None
+
+    def bring_back(self, version: int) -> Receipt:
+        """Write down again what `undone` gave.
+
+        Args:
+            version: Version of the timeline that this makes.
+        """
+        undo, back = self.redo_steps.pop()
+        self._put_back(back)
+        self.undo_steps.append(undo)
+        self.redo_version = version
+        return self.receipt(undo.command_id)
+
+    def _put_back(self, step: Undo[_TimelineT]) -> Undo[_TimelineT]:
+        """Let entries, log and stills be again what they were; what leads from there to what they are now."""
+        index, changes = step.changes
+        known: dict[int, LedgerEntry | None] = {i: self.entries[i] for i in step.overwritten}
+        log, stills = (index, tuple(self.changes[index:])), []
+        self._write_log(index, changes)
+        for first, there in step.stills:
+            stills.append((first, tuple(self.stills[first:])))
+            self.stills[first:] = there
+        for entry in step.overwritten.values():
+            if entry is not None:
+                self._set(entry)
+        return step._replace(changes=log, overwritten=known, stills=tuple(reversed(stills)))
 
     def fuse(self) -> None:
         """Make the newest two edits one, to be taken back together."""
@@ -490,6 +531,7 @@ class Ledger(Generic[_TimelineT]):
         """Write a change down, behind which nothing can be taken back, and why."""
         self._write_log(len(self.changes), (change,))
         self.undo_steps.clear()
+        self.redo_steps.clear()
         self.settled = why
         del self.stills[bisect_left(self.stills, (change.at, 0)) :]
 

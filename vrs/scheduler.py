@@ -17,7 +17,7 @@ from enum import Enum
 from functools import partial
 from math import inf
 from operator import add
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from typing_extensions import override
@@ -78,6 +78,12 @@ from vrs.timeline import BaseTimeline, Timeline
 
 TimelineT = TypeVar("TimelineT", bound=BaseTimeline[Any])
 
+REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
+"""What planning raises when a command can't be."""
+
+Edited: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit
+"""What changes a timeline."""
+
 _NAMED_AT_ONCE = 64
 """Segments whose commands are named at once; those of longer runs when somebody asks."""
 
@@ -104,57 +110,106 @@ class BaseScheduler(Generic[TimelineT]):
     def atomic(self) -> Iterator[None]:
         """Put everything back as it was, receipts too, if what is done meanwhile raises."""
         saved = vars(self).copy()
-        try:
-            with self.ledger.atomic():
+        with self.ledger.atomic():
+            try:
                 yield
-        except BaseException:
-            vars(self).update(saved)
-            raise
+            except BaseException:
+                vars(self).update(saved)
+                raise
 
     def brake(self, t: float, command_id: int) -> tuple[TimelineT, Notes]:
         """What is scheduled, with the robot braking from t [s] on for a command; and what must be said of it."""
         raise NotImplementedError
 
-    def moment(self, command: PlanEdit | SteerCommand, now: float | None, soonest: float) -> EditTiming:
-        """When an edit acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
+    def execute(self, command: Edited, now: float | None) -> Receipt:
+        """Carry out a command or an edit of what is scheduled.
 
         Args:
-            command: The edit.
+            command: Of a form that fits the robot.
+            now: Present time [s]; None offline.
+
+        Returns:
+            Its receipt, or that of the command that it edits; rejected, with nothing changed, where it can't be.
+
+        Raises:
+            UnknownCommandError: If it names a command that has no receipt.
+        """
+        try:
+            return self.carry_out(command, now)
+        except REFUSALS as error:
+            issued, asked = now if command.issued_at is None else command.issued_at, command.execute_at
+            if not isinstance(command, (Retime, Cancel, InsertVia)):
+                return self.reject(issued, asked, str(error))
+            number, version = command.command_id, self.timeline.version
+            return Receipt(number, Status.REJECTED, issued, asked, reason=str(error), version=version)
+
+    def carry_out(self, command: Edited, now: float | None) -> Receipt:
+        """The same where it can be.
+
+        Raises:
+            PlanningError: If it can't, as any of `REFUSALS`.
+        """
+        raise NotImplementedError
+
+    def timing(self, command: Edited, now: float | None, soonest: float) -> EditTiming:
+        """When a command acts: as asked, else as soon as it can; a late one at once or, by the other policy, not.
+
+        A late motion begins after the segment that is under way.
+
+        Args:
+            command: The command.
             now: Present time [s]; None offline.
             soonest: As soon as it can, offline [s].
 
         Raises:
             PlanningError: If it's late and the policy rejects, or if it was to act before it was issued.
         """
-        asked = _as_asked(command, now, soonest if now is None else now)
-        if now is None or asked.t >= now:
-            return asked
-        late = _passed(asked.t, now)
+        issued, asked = command.issued_at, command.execute_at
+        if now is None:
+            return EditTiming(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, ())
+        issued = now if issued is None else issued
+        t = max(now, issued) if asked is None else asked
+        if t < issued:
+            raise PlanningError(f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s")
+        if t >= now:
+            return EditTiming(t, issued, asked, Status.ACCEPTED, ())
+        late = f"t_exec = {t:.9g} s had passed at {now:.9g} s"
         if self.lateness is Lateness.REJECT and not isinstance(command, Stop):
             raise PlanningError(late)
-        return asked._replace(t=now, status=Status.POSTPONED, notes=(Note(NoteCode.LATE_AT_ONCE, (late,)),))
+        if isinstance(command, (MotionCommand, DriveCommand)):
+            t = self.end_of_active(now)
+            return EditTiming(t, issued, asked, Status.POSTPONED, (Note(NoteCode.LATE_POSTPONED, (late, t)),))
+        return EditTiming(now, issued, asked, Status.POSTPONED, (Note(NoteCode.LATE_AT_ONCE, (late,)),))
 
-    def beginning(self, command: MotionCommand | DriveCommand, now: float | None, soonest: float) -> EditTiming:
-        """When a motion begins: as asked, else as soon as it can; a late one after the segment that is under way.
-
-        By the other policy a late one doesn't begin at all.
+    @staticmethod
+    def entry(
+        command_id: int,
+        timing: EditTiming,
+        span: tuple[float, float],
+        version: int,
+        notes: Notes,
+        *,
+        q: Array | None = None,
+        command: MotionCommand | None = None,
+        **more: Any,
+    ) -> LedgerEntry:
+        """What is to be known of a command.
 
         Args:
-            command: The motion.
-            now: Present time [s]; None offline.
-            soonest: As soon as it can, offline [s]; with a clock not before now, nor before it was issued.
-
-        Raises:
-            PlanningError: If it's late and the policy rejects, or if it was to begin before it was issued.
+            command_id: Its number.
+            timing: When it acts.
+            span: When its motion begins and ends [s].
+            version: Of the timeline that it makes.
+            notes: What the user must know of it, beside what its timing says.
+            q: Joints of its target [rad], (n,).
+            command: The motion command that it is.
+            **more: Other fields of its receipt.
         """
-        asked = _as_asked(command, now, soonest)
-        if now is None or asked.t >= now:
-            return asked
-        late = _passed(asked.t, now)
-        if self.lateness is Lateness.REJECT:
-            raise PlanningError(late)
-        t = self.end_of_active(now)
-        return asked._replace(t=t, status=Status.POSTPONED, notes=(Note(NoteCode.LATE_POSTPONED, (late, t)),))
+        notes = timing.notes + notes
+        receipt = Receipt(
+            command_id, timing.status, timing.issued, timing.asked, *span, q, text_of(notes), version, **more
+        )
+        return LedgerEntry(receipt, command, notes)
 
     def touched(self, edit: Edit[TimelineT], t: float) -> tuple[Names, Names]:
         """Commands that an edit from t on shifts, and commands that it drops or cuts short."""
@@ -220,12 +275,24 @@ class BaseScheduler(Generic[TimelineT]):
             return None
         version = self.timeline.version + 1
         if now is None or now <= last.at:
-            self.timeline = last.before.with_version(version)
-            return self.ledger.take_back(version)
+            taken, self.timeline = self.timeline, last.before.with_version(version)
+            return self.ledger.take_back(version, taken)
         if now >= self.timeline.end:
             return None
         self.timeline, notes = self.brake(now, last.command_id)
         return self.ledger.break_off(Change(version, last.command_id, now, None), notes)
+
+    def redo(self, now: float | None) -> Receipt:
+        """Take back the newest undo; see `vrs.engine.Engine.redo`."""
+        undone = self.ledger.undone(self.timeline.version)
+        if undone is None:
+            why = "there's nothing to redo: nothing was undone, or something was commanded since"
+            return self.reject(now, None, why)
+        if now is not None and now > undone.at:
+            why = f"command {undone.command_id} can't be redone: its time, {undone.at:.6g} s, has passed"
+            return self.reject(now, None, why)
+        self.timeline = undone.before.with_version(self.timeline.version + 1)
+        return self.ledger.bring_back(self.timeline.version)
 
     def undo_refusal(self, now: float | None) -> str:
         """Why there's nothing to take back; see `vrs.engine.Engine.undo_refusal`."""
@@ -241,37 +308,6 @@ def _names(ledger: Ledger[Any], timeline: BaseTimeline[Any], index: int, t: floa
     """Commands that have segments from an index on, and hadn't arrived at t when the timeline was edited."""
     return tuple(i for i in timeline.owners(index, len(timeline)) if not ledger.arrived(i, t, timeline.version + 1))
 
-
-def _as_asked(
-    command: MotionCommand | DriveCommand | SteerCommand | PlanEdit, now: float | None, soonest: float
-) -> EditTiming:
-    """When a command is to act, be that late or not.
-
-    Args:
-        command: The command.
-        now: Present time [s]; None offline.
-        soonest: When, if it doesn't say so [s]; with a clock not before now, nor before it was issued.
-
-    Raises:
-        PlanningError: If it was to act before it was issued.
-    """
-    issued, asked = command.issued_at, command.execute_at
-    if now is None:
-        return EditTiming(soonest if asked is None else asked, issued, asked, Status.ACCEPTED, ())
-    issued = now if issued is None else issued
-    t = max(soonest, now, issued) if asked is None else asked
-    if t < issued:
-        raise PlanningError(f"t_exec = {t:.9g} s lies before t_iss = {issued:.9g} s")
-    return EditTiming(t, issued, asked, Status.ACCEPTED, ())
-
-
-def _passed(t: float, now: float) -> str:
-    """Say that a command is late."""
-    return f"t_exec = {t:.9g} s had passed at {now:.9g} s"
-
-
-REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
-"""What planning raises when a command can't be."""
 
 FRESH = 0.2
 """Age [s] at which a steering input ends."""
@@ -329,46 +365,57 @@ class Scheduler(BaseScheduler[Timeline]):
         self.alteration: Alteration | None = None
         """The newest; it's in force while the timeline is of its version."""
 
-    def move(self, command: MotionCommand, now: float | None) -> Receipt:
-        """Carry out a motion command.
+    @override
+    def carry_out(self, command: Edited, now: float | None) -> Receipt:
+        if self.alteration is None or isinstance(command, (SteerCommand, Alter, Stop, Resume)):
+            return self._act(command, now)
+        return self._under_offset(partial(self._act, command, now), now)
 
-        Args:
-            command: Checked by the analyser.
-            now: Present time [s]; None offline.
-        """
-        return self._under_offset(partial(self._move, command, now), now)
+    def _act(self, command: Edited, now: float | None) -> Receipt:
+        match command:
+            case MotionCommand():
+                return self._move(command, now)
+            case Retime():
+                return self._retime(command, now)
+            case Cancel():
+                return self._cancel(command, now)
+            case InsertVia():
+                return self._insert_via(command, now)
+            case ScaleTime():
+                return self._scale(command, now)
+            case SteerCommand():
+                return self._steer(command, now)
+            case Alter():
+                return self._alter(command, now)
+            case Stop():
+                return self._stop(command, now)
+            case Resume():
+                return self._resume(command, now)
+        raise InvalidValueError("command", command, f"for an arm: {self.model.name} has joints and no wheels")
 
     def _move(self, command: MotionCommand, now: float | None) -> Receipt:
-        issued = command.issued_at if command.issued_at is not None else now
-        asked, end = command.execute_at, self.timeline.end
-        try:
-            t, _, _, status, notes = self.beginning(command, now, end if now is None else now)
-        except PlanningError as error:
-            return self.reject(issued, asked, str(error))
-        if command.insertion is Insertion.APPEND and t < end:
+        end = self.timeline.end
+        timing = self.timing(command, now, end)
+        t, appends = timing.t, command.insertion is Insertion.APPEND
+        if appends and t < end:
             t = end
-            if asked is not None:
-                status = Status.POSTPONED
-                notes = (*notes, Note(NoteCode.APPENDED, (t,)))
+            if timing.asked is not None:
+                notes = (*timing.notes, Note(NoteCode.APPENDED, (t,)))
+                timing = timing._replace(status=Status.POSTPONED, notes=notes)
         command_id = self.ledger.newest + 1
-        planner, joiner = self.planner(command), self.joiner(command)
-        try:
-            if command.deviation > 0:
-                edit = self._passing(command, t, command_id, now)
-            else:
-                edit = insert(self.timeline, t, command.insertion, command_id, planner, joiner)
-        except REFUSALS as error:
-            return self.reject(issued, asked, str(error))
-        appended = command.insertion is Insertion.APPEND
-        appended, t = appended and edit.start == t, edit.start
+        if command.deviation > 0:
+            edit = self._passing(command, t, command_id, now)
+        else:
+            planner, joiner = self.planner(command), self.joiner(command)
+            edit = insert(self.timeline, t, command.insertion, command_id, planner, joiner)
+        appended, t = appends and edit.start == t, edit.start
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
         target = frozen_array(edit.target) if edit.target.flags.writeable else edit.target
-        notes += edit.notes
-        receipt = Receipt(
-            command_id, status, issued, asked, t, edit.arrival, target, text_of(notes), edit.timeline.version,
-            edit.shift, shifted_names=shifted, superseded_names=dropped,
+        entry = self.entry(
+            command_id, timing, (t, edit.arrival), edit.timeline.version, edit.notes, q=target, command=command,
+            shift=edit.shift, shifted_names=shifted, superseded_names=dropped,
         )  # fmt: skip
-        return self.accept(LedgerEntry(receipt, command, notes), edit, t, appended=appended)
+        return self.accept(entry, edit, t, appended=appended)
 
     def _passing(self, command: MotionCommand, t: float, command_id: int, now: float | None) -> Edit[Timeline]:
         """Insert a move that begins before the one that ends at t is over, and passes its target at a distance.
@@ -441,22 +488,17 @@ class Scheduler(BaseScheduler[Timeline]):
         """Whether a command moves the arm with bounded jerk throughout."""
         return self.profile(command_id) is Profile.JERK_LIMITED and not is_rough(self.ledger.notes(command_id))
 
-    def steer(self, command: SteerCommand, now: float | None) -> Receipt:
+    def _steer(self, command: SteerCommand, now: float | None) -> Receipt:
         """Go on, from now, as a hand asks; inputs in a row with nothing else between are one command."""
-        asked = command.execute_at
-        issued = command.issued_at if command.issued_at is not None else now
-        try:
-            moment = self.moment(command, now, self.timeline.end)
-            t = moment.t
-            hold = FRESH - (0.0 if issued is None else max(t - issued, 0.0))
-            if hold <= 0:
-                raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
-            state = self.timeline.state_before(t)
-            plan, notes, hindrance = steering.steer(
-                state, command.rates, command.twist, command.frame, hold, self.model, self.limits
-            )
-        except REFUSALS as error:
-            return self.reject(issued, asked, str(error))
+        timing = self.timing(command, now, self.timeline.end)
+        t, issued = timing.t, timing.issued
+        hold = FRESH - (0.0 if issued is None else max(t - issued, 0.0))
+        if hold <= 0:
+            raise PlanningError(f"the input is {FRESH - hold:.3g} s old; it moves nothing from {FRESH} s on")
+        state = self.timeline.state_before(t)
+        plan, notes, hindrance = steering.steer(
+            state, command.rates, command.twist, command.frame, hold, self.model, self.limits
+        )
         before, session = self.timeline, self.session
         rests = not state.qd.any() and not state.qdd.any()
         if session is not None and (session[1] != before.version or t < session[2] or (rests and t < before.end)):
@@ -474,20 +516,22 @@ class Scheduler(BaseScheduler[Timeline]):
         target = end_position(plan) if len(plan) else state.q
         self.note_profile(command_id, Profile.JERK_LIMITED)
         self.session = command_id, after.version, start
-        notes = moment.notes + notes
-        receipt = Receipt(
-            command_id, moment.status, moment.issued, asked, start, t + plan.duration, frozen_array(target),
-            text_of(notes), after.version, hindrance=hindrance,
+        end = t + plan.duration
+        edit = Edit(after, t, end, target, dropped=None)
+        superseded = self.touched(edit, t)[1] if session is None else ()
+        entry = self.entry(
+            command_id, timing, (start, end), after.version, notes, q=frozen_array(target), hindrance=hindrance,
+            superseded_names=superseded,
         )  # fmt: skip
-        if session is not None:
-            self.timeline = after
-            self.ledger.rewrite(receipt, notes)
-            return receipt
-        edit = Edit(after, t, t + plan.duration, target, dropped=None)
-        receipt = replace(receipt, superseded_names=self.touched(edit, t)[1])
-        return self.accept(LedgerEntry(receipt, notes=notes), edit, t)
+        return self.accept(entry, edit, t) if session is None else self._go_on(entry, after)
 
-    def alter(self, command: Alter, now: float | None) -> Receipt:
+    def _go_on(self, entry: LedgerEntry, after: Timeline) -> Receipt:
+        """Put what a command in force does now in the place of what it did."""
+        self.timeline = after
+        self.ledger.rewrite(entry.receipt, entry.notes)
+        return entry.receipt
+
+    def _alter(self, command: Alter, now: float | None) -> Receipt:
         """Add an offset to what is planned; such commands in a row with nothing else between are one.
 
         Raises:
@@ -497,8 +541,8 @@ class Scheduler(BaseScheduler[Timeline]):
         if given is not None and begins is not None and given > begins:
             # A clock that's ahead of this one says for when it's meant, not when it begins.
             command = replace(command, issued_at=begins)
-        moment = self.moment(command, now, self.timeline.end)
-        t = moment.t
+        timing = self.timing(command, now, self.timeline.end)
+        t = timing.t
         given = t if given is None else given
         if t - given >= FRESH:
             raise PlanningError(f"the offset is {t - given:.3g} s old; it moves nothing from {FRESH} s on")
@@ -524,18 +568,13 @@ class Scheduler(BaseScheduler[Timeline]):
         again = altering.remembered(known.given, command.offset, given + lag)
         known = known._replace(given=again, stays=command.stays, lag=lag)
         after, known, notes = self._with_offset(before, known, t, before.version + 1)
-        late = text_of(notes)
-        receipt = Receipt(
-            known.command_id, moment.status, moment.issued, moment.asked, known.start, known.rejoins, None,
-            text_of(moment.notes + notes), after.version, hindrance=late,
-        )  # fmt: skip
+        entry = self.entry(
+            known.command_id, timing, (known.start, known.rejoins), after.version, notes, hindrance=text_of(notes)
+        )
         self.alteration = known
         if known.command_id in self.ledger:
-            self.timeline = after
-            self.ledger.rewrite(receipt, moment.notes + notes)
-            return receipt
-        edit = Edit(after, t, known.rejoins, before.state_before(t).q)
-        return self.accept(LedgerEntry(receipt, notes=moment.notes + notes), edit, t, appended=True)
+            return self._go_on(entry, after)
+        return self.accept(entry, Edit(after, t, known.rejoins, before.state_before(t).q), t, appended=True)
 
     def _offset_at(self, t: float) -> Alteration | None:
         """The offset that's in force at a time [s]; None where there's none, or it has gone back to nothing."""
@@ -587,9 +626,12 @@ class Scheduler(BaseScheduler[Timeline]):
         before, newest = self.timeline, self.ledger.newest
         planned = _rejoined(before, known.planned, now, [], now, known.rejoins).with_version(before.version)
         self.timeline = planned
-        receipt = edit()
-        if self.timeline is planned:
-            self.timeline = before
+        try:
+            receipt = edit()
+        finally:
+            if self.timeline is planned:
+                self.timeline = before
+        if self.timeline is before:
             return receipt
         known = known._replace(planned=self.timeline, rejoins=now)
         try:
@@ -639,47 +681,6 @@ class Scheduler(BaseScheduler[Timeline]):
         """Let the next steering input go on with a command that began at a time [s]."""
         self.session = command_id, self.timeline.version, start
 
-    def edit(self, command: PlanEdit, now: float | None) -> Receipt:
-        """Carry out an edit of what is scheduled.
-
-        Args:
-            command: The edit.
-            now: Present time [s]; None offline.
-
-        Returns:
-            The receipt of the command that was edited, or of the edit; rejected, with nothing changed, where it
-            can't be.
-
-        Raises:
-            UnknownCommandError: If it names a command that has no receipt.
-        """
-        if isinstance(command, (Retime, Cancel, InsertVia)):
-            receipt = self.ledger.receipt(command.command_id)
-            issued = command.issued_at if command.issued_at is not None else now
-            try:
-                if isinstance(command, Retime):
-                    return self._under_offset(partial(self._retime, command, receipt, now), now)
-                if isinstance(command, Cancel):
-                    return self._under_offset(partial(self._cancel, command, receipt, now), now)
-                return self._under_offset(partial(self._insert_via, command, receipt, now), now)
-            except REFUSALS as error:
-                version = self.timeline.version
-                asked = command.execute_at
-                return Receipt(
-                    receipt.command_id, Status.REJECTED, issued, asked, reason=str(error), version=version
-                )
-        try:
-            if isinstance(command, Alter):
-                return self.alter(command, now)
-            if isinstance(command, ScaleTime):
-                return self._under_offset(partial(self.scale, command, now), now)
-            if isinstance(command, Stop):
-                return self.stop(command, now)
-            return self.resume(command, now)
-        except REFUSALS as error:
-            issued = command.issued_at if command.issued_at is not None else now
-            return self.reject(issued, command.execute_at, str(error))
-
     def _motion(self, receipt: Receipt) -> MotionCommand:
         """The command of a move, with the arm solution that it got.
 
@@ -691,22 +692,23 @@ class Scheduler(BaseScheduler[Timeline]):
             raise PlanningError(f"command {receipt.command_id} is no move that can be planned anew")
         return replace(command, target=JointTarget(receipt.q), insertion=Insertion.SPLICE)
 
-    def _retime(self, command: Retime, receipt: Receipt, now: float | None) -> Receipt:
-        moment = self.moment(command, now, command.execute_at)
-        t = moment.t
+    def _retime(self, command: Retime, now: float | None) -> Receipt:
+        receipt = self.ledger.receipt(command.command_id)
+        timing = self.timing(command, now, command.execute_at)
+        t = timing.t
         start, _ = _scheduled(receipt, -np.inf if now is None else now)
         segments = span(self.timeline, receipt.command_id, start)
         if now is not None and min(start, self._first(segments)) < now:
             raise PlanningError(f"command {receipt.command_id} began at {start:.6g} s")
         motion = self._motion(receipt)
         planner, joiner = self.planner(motion), self.joiner(motion)
-        notes = (*moment.notes, Note(NoteCode.RETIMED, (start,)))
+        notes = (*timing.notes, Note(NoteCode.RETIMED, (start,)))
         if segments is not None:
             earliest, latest = room(self.timeline, *segments)
             if earliest <= t < latest:
                 made = moved(self.timeline, *segments, t, receipt.command_id, planner, joiner, self.stop_at)
                 at = min(start, t, self.timeline.start_of(segments[0]))
-                return self.accept(self._as_planned(receipt, motion, made, moment, notes, at), made, at)
+                return self.accept(self._as_planned(receipt, motion, made, timing, notes, at), made, at)
         # It goes past another move: it's taken out, and commanded again at its new time.
         before = self.timeline
         taken, more = self._take_out(receipt, start, now)
@@ -716,7 +718,7 @@ class Scheduler(BaseScheduler[Timeline]):
             self.ledger.take_back(before.version)
             self.timeline = before
             raise
-        planned = self._as_planned(receipt, motion, made, moment, notes, t)
+        planned = self._as_planned(receipt, motion, made, timing, notes, t)
         answer, notes = planned.receipt, planned.notes + more
         answer = replace(
             answer,
@@ -734,7 +736,7 @@ class Scheduler(BaseScheduler[Timeline]):
         receipt: Receipt,
         motion: MotionCommand,
         made: Edit[Timeline],
-        moment: EditTiming,
+        timing: EditTiming,
         notes: Notes,
         at: float,
     ) -> LedgerEntry:
@@ -743,7 +745,7 @@ class Scheduler(BaseScheduler[Timeline]):
         notes += made.notes
         receipt = replace(
             receipt,
-            status=moment.status,
+            status=timing.status,
             execute_at=made.start,
             end=made.arrival,
             q=frozen_array(made.target),
@@ -755,10 +757,11 @@ class Scheduler(BaseScheduler[Timeline]):
         )
         return LedgerEntry(receipt, motion, notes)
 
-    def _cancel(self, command: Cancel, receipt: Receipt, now: float | None) -> Receipt:
-        moment = self.moment(command, now, -np.inf)
-        start, _ = _scheduled(receipt, moment.t)
-        return self._take_out(receipt, max(start, moment.t), now)[0]
+    def _cancel(self, command: Cancel, now: float | None) -> Receipt:
+        receipt = self.ledger.receipt(command.command_id)
+        timing = self.timing(command, now, -np.inf)
+        start, _ = _scheduled(receipt, timing.t)
+        return self._take_out(receipt, max(start, timing.t), now)[0]
 
     def _first(self, segments: tuple[int, int] | None) -> float:
         """The knot at which a move begins [s]: its receipt's time may lie a rounding later."""
@@ -826,10 +829,11 @@ class Scheduler(BaseScheduler[Timeline]):
         )
         return made, (LedgerEntry(shifted, self.ledger.command(other), notes),)
 
-    def _insert_via(self, command: InsertVia, receipt: Receipt, now: float | None) -> Receipt:
-        moment = self.moment(command, now, -np.inf)
-        start, end = _scheduled(receipt, moment.t)
-        t = max(start, moment.t)
+    def _insert_via(self, command: InsertVia, now: float | None) -> Receipt:
+        receipt = self.ledger.receipt(command.command_id)
+        timing = self.timing(command, now, -np.inf)
+        start, end = _scheduled(receipt, timing.t)
+        t = max(start, timing.t)
         timeline, motion = self.timeline, self._motion(receipt)
         segments = span(timeline, receipt.command_id, start)
         if segments is None or t >= end:
@@ -852,19 +856,18 @@ class Scheduler(BaseScheduler[Timeline]):
         gap = Gap(t, t, timeline.state_before(t), next_move(timeline, segments[1]))
         made = fill(timeline, gap, receipt.command_id, by_way, self.joiner(motion))
         made = made._replace(start=start)
-        notes = (*moment.notes, Note(NoteCode.BY_A_VIA))
-        return self.accept(self._as_planned(receipt, motion, made, moment, notes, t), made, t)
+        notes = (*timing.notes, Note(NoteCode.BY_A_VIA))
+        return self.accept(self._as_planned(receipt, motion, made, timing, notes, t), made, t)
 
-    def scale(self, command: ScaleTime, now: float | None) -> Receipt:
+    def _scale(self, command: ScaleTime, now: float | None) -> Receipt:
         """Let what is scheduled run at another pace.
 
         Raises:
             PlanningError: If a limit would be passed.
         """
-        moment = self.moment(command, now, self.timeline.start)
+        timing = self.timing(command, now, self.timeline.start)
         timeline, factor = self.timeline, command.factor
-        t = max(moment.t, timeline.start)
-        moment = moment._replace(t=t)
+        t = max(timing.t, timeline.start)
         if factor > 1:
             self._check_faster(t, factor)
         for jerk in (False, True):
@@ -882,19 +885,20 @@ class Scheduler(BaseScheduler[Timeline]):
                 return old
             return t + (law.when(old) if old < s else law.duration + (old - s) / factor)
 
-        change = Change(after.version, self.ledger.newest + 1, t, frozenset(), moved, stills=False)
-        entry = self._edit_entry(moment, after, t + law.duration, (Note(NoteCode.AT_A_PACE, (factor,)),))
-        begin = t + law.waits
+        number, begin = self.ledger.newest + 1, t + law.waits
+        shifted: Names = ()
+        change = Change(after.version, number, t, frozenset(), moved, stills=False)
         if factor != 1 and begin < timeline.end:
             shifted = self.named(timeline, max(timeline.index_at(begin), 0), begin)
-            entry = entry._replace(receipt=replace(entry.receipt, shifted_names=shifted))
+        notes = (Note(NoteCode.AT_A_PACE, (factor,)),)
+        entry = self.entry(number, timing, (t, t + law.duration), after.version, notes, shifted_names=shifted)
         self.timeline = after
         return self.ledger.accept(entry, timeline, change)
 
-    def stop(self, command: Stop, now: float | None) -> Receipt:
+    def _stop(self, command: Stop, now: float | None) -> Receipt:
         """Stop along the present motion, from the commanded state, and drop what is scheduled."""
-        moment = self.moment(command, now, self.timeline.end)
-        timeline, t = self.timeline, moment.t
+        timing = self.timing(command, now, self.timeline.end)
+        timeline, t = self.timeline, timing.t
         number = self.ledger.newest + 1
         profile = self.profile(owner_before(timeline, t))
         jerky = profile is Profile.JERK_LIMITED
@@ -920,16 +924,14 @@ class Scheduler(BaseScheduler[Timeline]):
                 pieces = [piece(braking, number)]
         after = timeline.edited(t, pieces)
         end = t + sum(sum(part.durations) for part in pieces)
-        names = self.named(timeline, max(timeline.index_at(t), 0), t)
-        entry = self._edit_entry(moment, after, end, notes)
-        receipt = replace(entry.receipt, q=frozen_array(after.sample(end)), superseded_names=names)
-        change = Change(after.version, number, t, None)
-        self.timeline = after
+        edit = Edit(after, t, end, frozen_array(after.sample(end)), dropped=None)
+        _, names = self.touched(edit, t)
+        entry = self.entry(number, timing, (t, end), after.version, notes, q=edit.target, superseded_names=names)
         self.note_profile(number, profile)
         self.paused = Paused(after.version, timeline, t)
-        return self.ledger.accept(entry._replace(receipt=receipt), timeline, change)
+        return self.accept(entry, edit, t)
 
-    def resume(self, command: Resume, now: float | None) -> Receipt:
+    def _resume(self, command: Resume, now: float | None) -> Receipt:
         """Go on with what the newest stop interrupted and dropped.
 
         The interrupted command is planned anew from where the arm stands; what was scheduled after it follows as it
@@ -938,11 +940,11 @@ class Scheduler(BaseScheduler[Timeline]):
         Raises:
             PlanningError: If nothing was stopped, or something was commanded since.
         """
-        moment = self.moment(command, now, self.timeline.end)
+        timing = self.timing(command, now, self.timeline.end)
         paused, timeline = self.paused, self.timeline
         if paused is None or paused.version != timeline.version:
             raise PlanningError("there's nothing to resume: nothing was stopped, or something was commanded since")
-        t = max(moment.t, timeline.end)
+        t = max(timing.t, timeline.end)
         old, index = paused.timeline, paused.timeline.index_at(paused.at)
         number = self.ledger.newest + 1
         owner = old.owner_of(index) if 0 <= index < len(old) else HOLD
@@ -995,12 +997,13 @@ class Scheduler(BaseScheduler[Timeline]):
                 interrupted, execute_at=t, end=made.arrival, version=after.version, reason=text_of(notes)
             )
             others = (LedgerEntry(again, motion, notes),)
-        moment = moment._replace(t=t)
-        entry = self._edit_entry(moment, after, made.arrival, (Note(NoteCode.RESUMED), *made.notes))
         names = tuple(i for i in lost if not self.ledger.arrived(i, paused.at))
-        receipt = replace(entry.receipt, shift=shift, superseded_names=names)
+        entry = self.entry(
+            number, timing, (t, made.arrival), after.version, (Note(NoteCode.RESUMED), *made.notes), shift=shift,
+            superseded_names=names,
+        )  # fmt: skip
         self.timeline = after
-        return self.ledger.reinstate(entry._replace(receipt=receipt), timeline, change, others)
+        return self.ledger.reinstate(entry, timeline, change, others)
 
     def _straight_stop(self, state: State, t: float) -> Plan | None:
         """A stop at t along a way that's straight in joint space, and long enough; None where it isn't."""
@@ -1010,13 +1013,6 @@ class Scheduler(BaseScheduler[Timeline]):
             return None
         ahead, needed = self.timeline.sample(until) - state.q, end_state(found).q - state.q
         return found if ahead @ state.qd >= needed @ state.qd else None
-
-    def _edit_entry(self, moment: EditTiming, after: Timeline, end: float, notes: Notes) -> LedgerEntry:
-        notes = moment.notes + notes
-        number = self.ledger.newest + 1
-        stamps = moment.issued, moment.asked, moment.t
-        receipt = Receipt(number, moment.status, *stamps, end, None, text_of(notes), after.version)
-        return LedgerEntry(receipt, notes=notes)
 
     def _check_faster(self, t: float, factor: float) -> None:
         """Refuse a pace that passes a limit, and say how fast it could be.

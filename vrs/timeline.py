@@ -172,7 +172,9 @@ class BaseTimeline(Generic[S]):
     def owners(self, low: int, high: int) -> tuple[int, ...]:
         """Distinct command ids of the segments low to high − 1, in order, without holds."""
         parts = leaves(self._root, self._height, low, high)
-        found = dict.fromkeys(owner for leaf, part, _ in parts for owner in leaf.owners[part])
+        found: dict[int, None] = {}
+        for leaf, part, _ in parts:
+            found.update(dict.fromkeys(leaf.owners[part]))
         found.pop(HOLD, None)
         return tuple(found)
 

@@ -70,7 +70,7 @@ def study(
         asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
         paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
     prepare(out, "runs.csv", "summary.json")
-    found = measured(paper, asked, workers)
+    (found,) = measured([(paper, asked)], workers)
     write(found, out)
     if as_json:
         typer.echo(to_json(found), nl=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,11 +56,13 @@ def reproduce(
     chosen = papers(paper)
     more = [found for path in beyond or () for found in read_verdicts(path)]
     prepare(out, "reproduce.html", *(f"{each.name}.json" for each in chosen))
+    studies = [
+        (each, Study(seed, each.runs if runs is None else runs, each.length if length is None else length))
+        for each in chosen
+    ]
+    made = [(found, write(found, out)) for found in measured(studies, workers)]
     written: list[ClaimReport] = []
-    for each in chosen:
-        study = Study(seed, each.runs if runs is None else runs, each.length if length is None else length)
-        reproduction = measured(each, study, workers)
-        path = write(reproduction, out)
+    for reproduction, path in made:
         written.extend(read_verdicts(path))
         if as_json:
             typer.echo(to_json(reproduction), nl=False)
@@ -70,13 +73,18 @@ def reproduce(
         typer.echo(f"Wrote {page}: all claims on one page")
 
 
-def measured(paper: Paper, study: Study, workers: int) -> Reproduction:
-    """Measure a paper's claims, with a bar for each part."""
-    from interfaces.lab import reproduce as measure
+def measured(chosen: Sequence[tuple[Paper, Study]], workers: int) -> Iterator[Reproduction]:
+    """Measure papers' claims, with a bar for each part; of several papers, one that is done has none any more."""
+    from interfaces.lab import reproductions
 
     with bars("{task.description:26}") as bar:
-        tasks = {part.title: bar.add_task(part.title, total=len(part.cases)) for part in paper.parts}
-        return measure(paper, study, workers=workers, progress=lambda title: bar.advance(tasks[title]))
+        tasks = {
+            part: bar.add_task(part.title, total=len(part.cases)) for paper, _ in chosen for part in paper.parts
+        }
+        for made in reproductions(chosen, workers=workers, progress=lambda part: bar.advance(tasks[part])):
+            yield made
+            for part in made.paper.parts if len(chosen) > 1 else ():
+                bar.update(tasks[part], visible=False)
 
 
 NARROWEST = 8

@@ -308,11 +308,14 @@ class _Class:
 async def _show_codes(pages: JoinPages) -> None:
     """Print the codes of a class whenever there are new ones."""
     import asyncio
+    import contextlib
 
+    pictures = sys.stdout.isatty() and sys.stdout.encoding.lower() == "utf-8"
     while True:
-        text, left = pages.shown(pictures=sys.stdout.isatty())
-        # Nobody waits for a terminal that takes no lines.
-        await asyncio.to_thread(typer.echo, text, nl=False)
+        text, left = pages.shown(pictures=pictures)
+        with contextlib.suppress(OSError):
+            # Nobody waits for a terminal that takes no lines.
+            await asyncio.to_thread(typer.echo, text, nl=False)
         await asyncio.sleep(left)
 
 
@@ -355,6 +358,7 @@ async def _serve(
         from interfaces.messages.control import Role
         from interfaces.runtime.live.operator import share_world
         from interfaces.runtime.live.twins import ArmTwins
+        from interfaces.station.plans import Plans
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -387,6 +391,8 @@ async def _serve(
                 routes.append(PageTerminalServer(room, access).route)
                 if one.val_port is not None:
                     val_room = room
+            if not one.robot.is_base:
+                routes += Plans(one.robot.arm, access, operator.clock).routes
             routes += _station(one, serving).routes
             if one.folder:
                 others.append(Mount(one.folder, routes=routes))

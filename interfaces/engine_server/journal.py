@@ -13,8 +13,8 @@ import msgspec
 
 from interfaces.messages import Change, History, Order, Outcome, RefusalCode
 from interfaces.messages.fields import MOST_NAMES
-from interfaces.messages.requests import portable
-from vrs.commands import Command
+from interfaces.messages.requests import NAMED, CommandName, portable
+from vrs.commands import Cancel, Command, InsertVia, Redo, Retime
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError, VrsError
 from vrs.ledger import Receipt, Status
@@ -54,7 +54,15 @@ def parts(edit: int, timeline: Timeline, index: int) -> list[History]:
     return [History(edit, cut, segments=timeline.segments[cut : cut + PART]) for cut in cuts]
 
 
-def difference(base: Timeline, new: Timeline, since: float, *, edit: int, command_id: int | None) -> Change | None:
+def difference(
+    base: Timeline,
+    new: Timeline,
+    since: float,
+    *,
+    edit: int,
+    command_id: int | None,
+    name: CommandName | None = None,
+) -> Change | None:
     """An edit as what it put in between what stays and what is shifted.
 
     Timelines share what an edit left as it was, so that a long plan costs little.
@@ -65,6 +73,7 @@ def difference(base: Timeline, new: Timeline, since: float, *, edit: int, comman
         since: Nothing changed before this time [s].
         edit: Number of the edit.
         command_id: Who made it.
+        name: What that command is called, where it's new.
 
     Returns:
         The message; None where the timeline begins elsewhere now.
@@ -85,6 +94,7 @@ def difference(base: Timeline, new: Timeline, since: float, *, edit: int, comman
         tail=tail,
         tail_start=new.start_of(last),
         end=new.end,
+        name=name,
     )
 
 
@@ -165,11 +175,15 @@ class TimelineEdit:
     """Nothing changed before this time [s]: the engine's when its timeline was still the one before; −∞ offline."""
     others: tuple[tuple[float, int], ...] = ()
     """Commands that came meanwhile and begin at these times [s], where the journal saw only what they made."""
+    name: CommandName | None = None
+    """What the command is called, where that's new."""
 
     @cached_property
     def change(self) -> Change | None:
         """The edit as a message; None where the timeline begins elsewhere now."""
-        return difference(self.before, self.timeline, self.at, edit=self.number, command_id=self.command_id)
+        return difference(
+            self.before, self.timeline, self.at, edit=self.number, command_id=self.command_id, name=self.name
+        )
 
     def culprit(self, t: float) -> int | None:
         """The command by which this edit changed what happens at t [s].
@@ -201,6 +215,10 @@ class Journal:
         self._newest = max((*ids, *owners), default=0)
         self.edits: deque[TimelineEdit] = deque(maxlen=KEPT)
         self._parts: OrderedDict[tuple[int, int], list[History]] = OrderedDict()
+        self.names: deque[CommandName] = deque(maxlen=NAMED)
+        """What the newest commands are called that came as orders, oldest first."""
+        self._named: CommandName | None = None
+        """The newest of them where it was given since `look`."""
         self._done: Receipt | None = None
         """What `execute` did since `look`."""
         self._seen = self.past
@@ -223,7 +241,7 @@ class Journal:
             VrsError: As `Engine.execute`.
         """
         self.look()
-        result = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
+        result = self.engine.undo() if command is None else self.engine.execute(command)
         # It's done: from here on nothing may raise.
         self._done = result if isinstance(result, Receipt) else None
         return self._done
@@ -233,9 +251,11 @@ class Journal:
         engine = self.engine
         try:
             why = engine.undo_refusal() if order.command is None else ""
+            at = engine.now()
             receipt = self.execute(order.command)
         except VrsError as error:
             return Outcome(order.number, now, None, str(error))
+        self._name(order, receipt, at)
         if receipt is None:
             return Outcome(order.number, now, None, why)
         known = engine.refusal(receipt.command_id) if receipt.status is Status.REJECTED else None
@@ -245,6 +265,18 @@ class Journal:
         except Exception:  # noqa: BLE001 - the command is carried out, whatever keeps the others from being named
             receipt = msgspec.structs.replace(receipt, shifted_names=(), superseded_names=())
         return Outcome(order.number, now, receipt, code=code)
+
+    def _name(self, order: Order, receipt: Receipt | None, t: float) -> None:
+        """Write down what a command is called from a time [s] on, unless that's known; edits don't rename it."""
+        command = order.command
+        if receipt is None or receipt.status is Status.REJECTED or command is None:
+            return
+        if isinstance(command, Retime | Cancel | InsertVia | Redo):
+            return
+        known = next((name for name in reversed(self.names) if name.command_id == receipt.command_id), None)
+        if known is None or known.label != order.label:
+            self._named = CommandName.of(command, order.label, receipt.command_id, t)
+            self.names.append(self._named)
 
     def look(self) -> int:
         """Write down what was done to the engine, here or by others; the number of the newest edit."""
@@ -266,11 +298,12 @@ class Journal:
             alone = timeline.version == self._timeline.version + 1 and len(begun) == 1
             self._write(timeline, begun[0][1] if alone else None, () if alone else tuple(begun))
             self._newest = newest
-        self._done, self._seen = None, self.past
+        self._done, self._named, self._seen = None, None, self.past
         return self.number
 
     def _write(self, timeline: Timeline, command_id: int | None, others: tuple[tuple[float, int], ...]) -> None:
-        edit = TimelineEdit(self.number + 1, self._timeline, timeline, command_id, self._seen, others)
+        number, name = self.number + 1, self._named
+        edit = TimelineEdit(number, self._timeline, timeline, command_id, self._seen, others, name)
         self.edits.append(edit)
         self._timeline, self.number = timeline, edit.number
 

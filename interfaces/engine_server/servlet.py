@@ -253,7 +253,8 @@ class ServedTimeline:
         rate = None if self._source is None else self._source.rate
         initial = frozen_array(timeline.initial)
         span = timeline.start, timeline.end, len(timeline)
-        self.outbox.append(Scene(self._follow.number, robot, initial, *span, edit, now, rate))
+        names = tuple(self.journal.names) if rate is None else ()
+        self.outbox.append(Scene(self._follow.number, robot, initial, *span, edit, now, rate, names))
 
     def _fetch(self, want: Want, now: float) -> None:
         if want.index is not None and want.edit == self._snapshot[0]:
@@ -307,7 +308,7 @@ class ServedTimeline:
         for number in list(self._outcomes)[-WATCHED:]:
             outcome = self._outcomes[number]
             old = outcome.receipt
-            if old is None or not old.stands:
+            if old is None or old.end is None:
                 continue
             new = self.journal.engine.receipt(old.command_id)
             if new.version != old.version:

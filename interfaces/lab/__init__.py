@@ -2,7 +2,7 @@
 
 from interfaces.lab.claims import Claim, Findings, Paper, PaperPart, Reproduction, Study, Table
 from interfaces.lab.papers import PAPERS, papers
-from interfaces.lab.runner import reproduce
+from interfaces.lab.runner import reproduce, reproductions
 
 __all__ = [
     "PAPERS",
@@ -15,4 +15,5 @@ __all__ = [
     "Table",
     "papers",
     "reproduce",
+    "reproductions",
 ]

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from interfaces.link.round_trip import RoundTrip
-from vrs.checks import at_least, finite, validated, within
+from vrs.checks import at_least, finite, not_before, validated, within
 from vrs.errors import InvalidValueError
 
 
@@ -231,8 +231,7 @@ class ClockSync:
         return ClockEvidence.BETTER if high - low < upper - lower and t0 >= self._verified else ClockEvidence.WIDE
 
     def _present(self, now: float) -> None:
-        if finite("now", now, "finite seconds") < self._now:
-            raise InvalidValueError("now", now, f"at least {self._now}, the last arrival")
+        not_before("now", now, self._now, "at least {}, the last arrival")
 
 
 class _Bounds:

@@ -12,8 +12,7 @@ import numpy as np
 
 from interfaces.link.conditions import Conditions, LinkConditions, LinkPath, Service
 from interfaces.link.packets import MAX_RECORDS, LossReason, PacketLog, PacketRecord
-from vrs.checks import finite, integer_in
-from vrs.errors import InvalidValueError
+from vrs.checks import finite, integer_in, not_before
 
 T = TypeVar("T")
 
@@ -29,16 +28,7 @@ class Delivery(Generic[T]):
     """Time of arrival [s], ≥ sent."""
 
 
-def moment(name: str, value: object, earliest: float) -> float:
-    """Return a time that doesn't run back [s].
-
-    Raises:
-        InvalidValueError: If it isn't finite, or lies before the earliest.
-    """
-    now = finite(name, value, "finite seconds")
-    if now < earliest:
-        raise InvalidValueError(name, now, f"at least {earliest}, the latest time so far")
-    return now
+_LATEST = "at least {}, the latest time so far"
 
 
 LONGEST_TIMEOUT = 60.0
@@ -124,7 +114,7 @@ class Channel(Generic[T]):
         Raises:
             InvalidValueError: If now is not finite, or runs back.
         """
-        self._advance(moment("now", now, self._now))
+        self._advance(not_before("now", now, self._now, _LATEST))
         self.conditions = conditions
         self._path.change(conditions)
         self._earliest = max([self._earliest, *(arrival for arrival, *_ in self._flight)])
@@ -144,7 +134,7 @@ class Channel(Generic[T]):
         Raises:
             InvalidValueError: If now is not finite, or runs back; or size is no number of bytes.
         """
-        now, size = moment("now", now, self._now), integer_in("size", size, 0, 2**31)
+        now, size = not_before("now", now, self._now, _LATEST), integer_in("size", size, 0, 2**31)
         self._advance(now)
         number = self.log.sent(size)
         if self.conditions.service is Service.IN_ORDER:
@@ -196,7 +186,9 @@ class Channel(Generic[T]):
             delivery, record = self._ready.popleft()
             self.log.settle(record)
             taken.append(delivery)
-        return tuple(sorted(taken, key=lambda delivery: delivery.arrived))
+        if len(taken) > 1:
+            taken.sort(key=lambda delivery: delivery.arrived)
+        return tuple(taken)
 
     def next_deadline(self) -> float | None:
         """When something arrives or is sent again [s]; a receipt then may still be empty. None when idle."""

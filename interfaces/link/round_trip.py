@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from interfaces.link.quantiles import LARGEST, MAX_CAPACITY, SlidingQuantiles
-from vrs.checks import at_least, finite, positive, validated, within
+from vrs.checks import at_least, finite, not_before, positive, validated, within
 from vrs.errors import InvalidValueError
 
 SEQUENCE_NUMBERS = 1 << 16
@@ -246,9 +246,7 @@ class RoundTripEstimator:
         return None if 0 <= held <= (now - sent) * 1.01 + rounding else EchoRefusal.IMPOSSIBLE
 
     def _advance(self, now: float) -> None:
-        if finite("now", now, "finite seconds") < self._now:
-            raise InvalidValueError("now", now, f"at least {self._now}, the time of the last call")
-        self._now = now
+        self._now = not_before("now", now, self._now, "at least {}, the time of the last call")
         while self.in_flight:
             sequence, sent = next(iter(self.in_flight.items()))
             if now < sent + self.config.timeout:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Final, NamedTuple, TypeAl
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import replace
 from typing_extensions import override
 
 from interfaces.messages.fields import (
@@ -27,6 +28,7 @@ from interfaces.messages.fields import (
     Number,
     Party,
     Rate,
+    Share,
     Text,
     Time,
     Word,
@@ -37,11 +39,11 @@ from interfaces.messages.fields import (
 )
 from interfaces.messages.segments import Dof, Segmented, Segments
 from vrs.checks import finite
-from vrs.commands import Command
+from vrs.commands import Command, Motion, MotionCommand, Profile
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array
-from vrs.record import set_field
+from vrs.record import Record, set_field
 
 if TYPE_CHECKING:
     Before: TypeAlias = int
@@ -176,6 +178,36 @@ class Frame:
     """Id of the first command that changed what happens at t."""
 
 
+NAMED: Final = 256
+"""Commands whose names are told to who has just come, at most."""
+Label = Annotated[str, Meta(max_length=60)]
+"""What people call a command."""
+
+
+class CommandName(Record, frozen=True, omit_defaults=True, gc=False):
+    """What a command is, and what people call it; of several of one command each counts from its time on."""
+
+    command_id: CommandId
+    t: Time
+    """From this session time on [s]: steering goes one way, then another."""
+    kind: Word
+    """Type of the command."""
+    label: Label = ""
+    """As the order said."""
+    speed: Share = 1.0
+    """Of a move, as it was commanded; so are motion and profile."""
+    motion: Motion = Motion.JOINT
+    profile: Profile = Profile.PARABOLIC
+
+    @classmethod
+    def of(cls, command: Command, label: str, command_id: int, t: float) -> CommandName:
+        """Name a command from a time [s] on."""
+        name = cls(command_id, t, str(command.__struct_config__.tag), label)
+        if not isinstance(command, MotionCommand):
+            return name
+        return replace(name, speed=command.speed, motion=command.motion, profile=command.profile)
+
+
 class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
     """Carry out a command. It's sent again until its outcome comes, and carried out once."""
 
@@ -186,6 +218,8 @@ class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):
     """None: take back the newest accepted command."""
     epoch: Epoch | None = None
     """Of the control lease; None where none is needed, as on an engine in this process."""
+    label: Label = ""
+    """What people call the command; all who follow the timeline are told."""
 
     def __post_init__(self) -> None:
         _check_number(self.number)
@@ -378,6 +412,8 @@ class Scene(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="s
     """Session time [s]."""
     rate: Rate | None = None
     """Of the frames that follow [1/s]; absent for segments."""
+    names: Annotated[tuple[CommandName, ...], Meta(max_length=NAMED)] = ()
+    """Of the newest commands, oldest first; absent for frames."""
 
 
 class History(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag="history"):
@@ -421,6 +457,8 @@ class Change(Segmented, Message, frozen=True, omit_defaults=True, gc=False, eq=F
     """Start of the first segment [s]."""
     segments: Segments = ()
     """These come after the first ones."""
+    name: CommandName | None = None
+    """What the command is called, where that's new."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

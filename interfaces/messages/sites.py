@@ -208,20 +208,20 @@ def arc_rows(arcs: Iterable[ArcSegment], began: float = 0.0) -> tuple[ArcRow, ..
     return tuple(rows)
 
 
-def _arcs(rows: tuple[ArcRow, ...]) -> tuple[ArcSegment, ...]:
+def arcs_of(rows: Iterable[ArcRow]) -> list[ArcSegment]:
     """The arcs of rows, whose ranges were checked when they came."""
-    return tuple(known_arc(start, T, (x, y, theta), v, w) for start, x, y, theta, v, w, T in rows)
+    return [known_arc(start, T, (x, y, theta), v, w) for start, x, y, theta, v, w, T in rows]
 
 
 @dataclass(frozen=True, slots=True)
 class ArcPacket:
-    """Arcs of the operator's path."""
+    """Arcs of the operator's path as they cross; times count from when the drive began."""
 
-    runs: tuple[tuple[int, tuple[ArcSegment, ...]], ...]
+    runs: tuple[tuple[int, tuple[ArcRow, ...]], ...] = ()
     """Runs of consecutive arcs, each with the number of its first."""
-    complete_until: float
+    complete_until: float = 0.0
     """No later packet changes the path before this time [s]."""
-    tail: tuple[ArcSegment, ...] = ()
+    tail: tuple[ArcRow, ...] = ()
     """How the virtual robot brakes from there, unless the operator goes on."""
 
 
@@ -262,8 +262,7 @@ class DriveOrders(Leased, frozen=True, omit_defaults=True, gc=False, tag="drive-
     @property
     def packet(self) -> ArcPacket:
         """Its arcs."""
-        runs = tuple((first, _arcs(rows)) for first, rows in self.runs)
-        return ArcPacket(runs, self.complete_until, _arcs(self.tail))
+        return ArcPacket(self.runs, self.complete_until, self.tail)
 
 
 class ArchitectureReport(Record, frozen=True, omit_defaults=True, gc=False):

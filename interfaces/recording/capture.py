@@ -6,11 +6,12 @@ Both drivers add what they know of the real robot.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from operator import itemgetter
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from typing_extensions import override
@@ -37,7 +38,7 @@ from interfaces.messages.sites import Report, Sample
 from interfaces.recording.channels import Message
 from interfaces.recording.history import AnyTimeline, edit_entries, whole_entries
 from interfaces.recording.kinds import ARM, MOBILE
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, virtual_pose
+from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, pose_of
 from interfaces.teleop import Correction
 from interfaces.teleop.operator import SiteObserver
 from vrs.commands import Profile
@@ -70,14 +71,8 @@ class Put(Protocol):
 
 
 _What: TypeAlias = CommandRecord | Placement | tuple[Correction, Timeline]
-
-
-class _Happened(NamedTuple):
-    """A command, a correction or a placement, and the timelines before and after it."""
-
-    what: _What
-    before: AnyTimeline
-    after: AnyTimeline
+_Happened: TypeAlias = tuple[_What, AnyTimeline, AnyTimeline]
+"""A command, a correction or a placement, and the timelines before and after it."""
 
 
 class Capture(SiteObserver[Report, Timeline]):
@@ -121,9 +116,10 @@ class Capture(SiteObserver[Report, Timeline]):
         self._known: dict[int, int] = {}
         self._cells: set[Cell] = set()
         self._ever: set[Cell] = set()
-        self._pose = Paced(POSE_RATE)
-        self.links = Paced(LINK_RATE)
-        """When links of the virtual robot are shown."""
+        self._poses = defaultdict[Site, Paced](partial(Paced, POSE_RATE))
+        """When a robot's pose is shown."""
+        self._links = defaultdict[tuple[str, ...], Paced](partial(Paced, LINK_RATE))
+        """When the links of robots are shown at once."""
         fresh = not engine.newest and not len(timeline) and timeline.start == now
         self.late = None if fresh or self.kind is MOBILE else engine.standing()
         """How an arm's engine stood; None where nothing had happened yet."""
@@ -187,7 +183,7 @@ class Capture(SiteObserver[Report, Timeline]):
 
     def _note(self, what: _What) -> None:
         before, self._timeline = self._timeline, self.engine.timeline
-        self._happened.append(_Happened(what, before, self._timeline))
+        self._happened.append((what, before, self._timeline))
         if len(self._happened) >= _WAITING:
             self.tell_happened()
             self.write_out()
@@ -196,23 +192,22 @@ class Capture(SiteObserver[Report, Timeline]):
         """Let a message of a time [s] be written."""
         self._due.append((t, message))
 
-    def show(self, paced: Paced, t: Array, q: Array, message: Callable[[float, Array, str], Message]) -> None:
+    def show(self, site: Site, t: Array, q: Array) -> None:
         """Let a robot's pose be shown, as often as it's due.
 
         Args:
-            paced: Chooses when.
+            site: Whose.
             t: Ascending times [s], (k,).
             q: Joints or postures, (k, n).
-            message: Made of a time [s], the pose then, and the frame that it's in.
         """
-        rows = paced.chosen(t, q)
+        rows = self._poses[site].chosen(t, q)
         if rows:
             for now, X in zip(t[rows].tolist(), self.kind.poses(self.model, q[rows]), strict=True):
-                self.add(now, message(now, X, self.kind.frame))
+                self.add(now, pose_of(site, now, X, self.kind.frame))
 
-    def show_links(self, paced: Paced, t: Array, **robots: Array) -> None:
+    def show_links(self, t: Array, **robots: Array) -> None:
         """Let all links of robots, `virtual` and `real`, be shown at once; see `show`."""
-        rows = paced.chosen(t, np.hstack([*robots.values()]))
+        rows = self._links[*robots].chosen(t, np.hstack([*robots.values()]))
         if rows:
             times = t[rows].tolist()
             chosen = {name: q[rows] for name, q in robots.items()}
@@ -261,7 +256,7 @@ class Capture(SiteObserver[Report, Timeline]):
         numbers = [max(since, 0), *(number for _, number in edits)]
         for row, (now, joints) in enumerate(zip(t.tolist(), q.tolist(), strict=True)):
             self.add(now, self.kind.sample(now, joints, numbers[places[row]]))
-        self.show(self._pose, t, q, virtual_pose)
+        self.show("virtual", t, q)
 
     def tell_happened(self) -> None:
         """Write down what was noted."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 from typing_extensions import override
@@ -28,7 +28,6 @@ from interfaces.recording.capture import Capture, late_of
 from interfaces.recording.channels import Message
 from interfaces.recording.drives import LiveDrives
 from interfaces.recording.mcap_file import RecordingError, Sink
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose
 from interfaces.recording.recorder import Recorder
 from interfaces.runs.twin_run import correction_events
 from interfaces.system import software
@@ -75,12 +74,8 @@ class LiveRecording:
     """What a mobile robot does with the operator's path, by its name, where that's known."""
 
 
-class _Measured(NamedTuple):
-    """Where the real robot was at a time [s], and what is written of that."""
-
-    t: float
-    q: Sequence[float]
-    messages: tuple[Message, ...]
+_Measured: TypeAlias = tuple[float, Sequence[float], tuple[Message, ...]]
+"""A time [s], where the real robot was then, and what is written of that."""
 
 
 class LiveRecorder(Capture):
@@ -136,7 +131,6 @@ class LiveRecorder(Capture):
         """Writes the file, once there is one."""
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._samples: list[_Measured] = []
-        self._real, self._real_links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._connected = self._halted = self._followed = False
         self._stopped, self._told = "", False
         self._rest: tuple[End, tuple[Receipt, ...]] | None = None
@@ -186,21 +180,21 @@ class LiveRecorder(Capture):
         if self._drives is not None:
             self._drives.follow(self, now=now)
         t, q = self.sample(now=now)
-        self.show_links(self.links, t, virtual=q)
+        self.show_links(t, virtual=q)
         self._write_samples()
         self.write_out()
 
     def _write_samples(self) -> None:
         """Write down what was measured of the real robot since the last time."""
-        samples, self._samples = sorted(self._samples, key=attrgetter("t")), []
+        samples, self._samples = sorted(self._samples, key=itemgetter(0)), []
         if not samples:
             return
-        t, q = np.array([sample.t for sample in samples]), np.array([sample.q for sample in samples])
-        for sample in samples:
-            for message in sample.messages:
-                self.add(sample.t, message)
-        self.show(self._real, t, q, real_pose)
-        self.show_links(self._real_links, t, real=q)
+        t, q = np.array([now for now, *_ in samples]), np.array([where for _, where, _ in samples])
+        for now, _, messages in samples:
+            for message in messages:
+                self.add(now, message)
+        self.show("real", t, q)
+        self.show_links(t, real=q)
 
     @override
     def commanded(self, deed: CommandRecord) -> None:
@@ -254,7 +248,7 @@ class LiveRecorder(Capture):
     def _measure(self, t: float, q: Sequence[float], *messages: Message) -> None:
         """Take a sample; what was measured before the recording began is compared with nothing in it."""
         if t >= self.since and len(self._samples) < _SAMPLES:
-            self._samples.append(_Measured(t, q, messages))
+            self._samples.append((t, q, messages))
 
     @override
     def failed(self, error: Exception) -> None:

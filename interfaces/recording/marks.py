@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterator, Sequence
+from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -87,6 +88,9 @@ class Mark(Record, frozen=True, omit_defaults=True, gc=False):
     command_id: int | None = None
 
 
+_when = attrgetter("t")
+
+
 class MarkReader:
     """The marks of a recording, by time; read on as it grows, and a bounded number of steps at a time."""
 
@@ -94,7 +98,6 @@ class MarkReader:
         self._recording = recording
         self.marks: Sequence[Mark] = ()
         """Those that were read so far."""
-        self._times: list[float] = []
         self._told: list[Mark] = []
         self._happened: list[Mark] = []
         self._commands = self._edits = self._events = 0
@@ -130,25 +133,29 @@ class MarkReader:
         elif not found:
             return self._commands < len(commands) or self._edits < len(edits)
         self._told += found
-        self.marks = sorted((*self._told, *self._happened), key=lambda mark: mark.t)
-        self._times = [mark.t for mark in self.marks]
+        self.marks = sorted((*self._told, *self._happened), key=_when)
         self.version += 1
         return self._commands < len(commands) or self._edits < len(edits)
 
     def passed(self, since: float, until: float) -> Sequence[Mark]:
         """The marks after one place, up to another [s], in that order: backwards where that's earlier."""
         if until >= since:
-            return self.marks[bisect_right(self._times, since) : bisect_right(self._times, until)]
-        return self.marks[bisect_left(self._times, until) : bisect_left(self._times, since)][::-1]
+            return self.marks[
+                bisect_right(self.marks, since, key=_when) : bisect_right(self.marks, until, key=_when)
+            ]
+        return self.marks[bisect_left(self.marks, until, key=_when) : bisect_left(self.marks, since, key=_when)][
+            ::-1
+        ]
 
     def latest(self, t: float) -> Mark | None:
         """The newest mark at a time [s]; None before the first."""
-        count = bisect_right(self._times, t)
+        count = bisect_right(self.marks, t, key=_when)
         return self.marks[count - 1] if count else None
 
     def beside(self, t: float, *, back: bool) -> Mark | None:
         """The next mark after a time [s], or the last one before it; None where there's none."""
-        index = bisect_left(self._times, t - 1e-6) - 1 if back else bisect_right(self._times, t + 1e-6)
+        marks = self.marks
+        index = bisect_left(marks, t - 1e-6, key=_when) - 1 if back else bisect_right(marks, t + 1e-6, key=_when)
         return self.marks[index] if 0 <= index < len(self.marks) else None
 
 

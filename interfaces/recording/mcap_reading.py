@@ -235,6 +235,12 @@ class Places:
     """Where the blocks of a file stand, and what they hold: a row a block."""
 
     def __init__(self) -> None:
+        self.topics: dict[int, str] = {}
+        """Topics by number of their channel, of an index."""
+        self.data_end = 0
+        """Where the blocks and all else before the index end."""
+        self.checksum: int | None = None
+        """Of all bytes up to there; None where there's none."""
         self.offsets, self.lengths = array("Q"), array("Q")
         self.starts, self.ends = array("Q"), array("Q")
         """Earliest and latest log time [ns]."""
@@ -256,21 +262,7 @@ class Places:
         self.channels.append(channels)
 
 
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """What the index says."""
-
-    places: Places
-    """Blocks, in the order of the file."""
-    topics: dict[int, str]
-    """Topics by number of their channel."""
-    data_end: int
-    """Where the blocks and all else before the index end."""
-    checksum: int | None
-    """Of all bytes up to there; None where there's none."""
-
-
-def read_summary(source: FileSource) -> Summary | None:
+def read_summary(source: FileSource) -> Places | None:
     """Read the index of a file.
 
     Returns:
@@ -294,16 +286,16 @@ def read_summary(source: FileSource) -> Summary | None:
     data = source.read(start, end - start)
     if len(data) < end - start or not checksum or zlib.crc32(footer[:25], zlib.crc32(data)) != checksum:
         return None
-    places, topics = _entries(data, source.where, start)
-    kind, length, whole = _DATA_END.unpack(source.read(start - _DATA_END.size, _DATA_END.size))
-    known = (kind, length) == (DATA_END, 4)
-    return Summary(places, topics, start - _DATA_END.size, whole if known and whole else None)
+    places = _entries(data, source.where, start)
+    places.data_end = start - _DATA_END.size
+    kind, length, whole = _DATA_END.unpack(source.read(places.data_end, _DATA_END.size))
+    places.checksum = whole if whole and (kind, length) == (DATA_END, 4) else None
+    return places
 
 
-def _entries(data: bytes, where: str, limit: int) -> tuple[Places, dict[int, str]]:
+def _entries(data: bytes, where: str, limit: int) -> Places:
     """Blocks and channels of an index."""
     places = Places()
-    topics: dict[int, str] = {}
     known: dict[bytes, frozenset[int]] = {}
     at, size = 0, len(data)
     try:
@@ -326,12 +318,12 @@ def _entries(data: bytes, where: str, limit: int) -> tuple[Places, dict[int, str
                 places.add(offset, taken, start, end, unpacked, held)
             elif kind == CHANNEL:
                 number, topic = channel_of(data[at : at + length], where)
-                topics[number] = topic
+                places.topics[number] = topic
             at += length
     except struct.error:
         raise FormatError(where, "its index has a record that's cut off") from None
     _check(places, where, limit)
-    return places, topics
+    return places
 
 
 def _check(places: Places, where: str, limit: int) -> None:
@@ -512,26 +504,26 @@ class Blocks:
         while self._cached > CACHED and len(self._cache) > 1:
             self._cached -= len(self._cache.popitem(last=False)[1])
 
-    def _take(self, summary: Summary) -> None:
+    def _take(self, places: Places) -> None:
         """The blocks that an index names; a small file is checked at once."""
         self.complete = True
-        self._count(sum(summary.places.sizes))
-        self._numbers = {number: NUMBERS[topic] for number, topic in summary.topics.items() if topic in NUMBERS}
-        self._places = summary.places
-        self._newest = max(summary.places.ends, default=0)
-        if self._source.size <= CHECKED and not self._whole(summary):
+        self._count(sum(places.sizes))
+        self._numbers = {number: NUMBERS[topic] for number, topic in places.topics.items() if topic in NUMBERS}
+        self._places = places
+        self._newest = max(places.ends, default=0)
+        if self._source.size <= CHECKED and not self._whole():
             self._marred = True
             for index in range(len(self)):
                 self._content(index)
 
-    def _whole(self, summary: Summary) -> bool:
+    def _whole(self) -> bool:
         """Whether the checksum of all that stands before the index holds."""
-        if summary.checksum is None:
+        checksum, end, found = self._places.checksum, self._places.data_end, 0
+        if checksum is None:
             return False
-        found = 0
-        for at in range(0, summary.data_end, WINDOW):
-            found = zlib.crc32(self._source.read(at, min(WINDOW, summary.data_end - at)), found)
-        return found == summary.checksum
+        for at in range(0, end, WINDOW):
+            found = zlib.crc32(self._source.read(at, min(WINDOW, end - at)), found)
+        return found == checksum
 
     def _count(self, size: int) -> None:
         """Keep account of what was unpacked."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from interfaces.messages.recording import Site
 from vrs.model import Array
 from vrs.record import Record
 
@@ -103,14 +104,11 @@ def timestamp(t: float) -> Timestamp:
     return Timestamp(*divmod(nanoseconds(t), _NANO))
 
 
-def virtual_pose(t: float, X: Array, frame: str = BASE) -> VirtualPose:
-    """The pose of the virtual robot's last link, or of the mobile robot, X (4, 4), in a frame, at a time [s]."""
-    return VirtualPose(timestamp(t), frame, _pose(X))
-
-
-def real_pose(t: float, X: Array, frame: str = BASE) -> RealPose:
-    """The same of the real robot."""
-    return RealPose(timestamp(t), frame, _pose(X))
+def pose_of(site: Site, t: float, X: Array, frame: str = BASE) -> VirtualPose | RealPose:
+    """The pose of a robot's last link, or of the mobile robot, X (4, 4), in a frame, at a time [s]."""
+    (row,) = _rows(X[None], POSE_DIGITS)
+    pose = Pose(Vector3(*row[:3]), Quaternion(*row[3:]))
+    return (VirtualPose if site == "virtual" else RealPose)(timestamp(t), frame, pose)
 
 
 def robot_frames(t: float, parent: str, names: Sequence[str], X: Array) -> FrameTransforms:
@@ -121,11 +119,6 @@ def robot_frames(t: float, parent: str, names: Sequence[str], X: Array) -> Frame
 
 def _placed(stamp: Timestamp, parent: str, name: str, row: list[float]) -> FrameTransform:
     return FrameTransform(stamp, parent, name, Vector3(*row[:3]), Quaternion(*row[3:]))
-
-
-def _pose(X: Array) -> Pose:
-    (row,) = _rows(X[None], POSE_DIGITS)
-    return Pose(Vector3(*row[:3]), Quaternion(*row[3:]))
 
 
 def link_transforms(t: float, robots: Sequence[tuple[str, Array]]) -> FrameTransforms:

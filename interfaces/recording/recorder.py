@@ -161,7 +161,8 @@ class Recorder:
             self.acknowledged, self._ended = self._written, True
         except RecordingError as error:
             self._failed = str(error)
-            self._give_up()
+            self._writer.give_up()
+            self.queue.clear()
         self._busy = None
 
     def _drain(self) -> None:
@@ -209,7 +210,3 @@ class Recorder:
             self._told = total
             drops = tuple(Drop(topic, count) for topic, count in self.dropped.items())
             self._writer.write_encoded(*encoded(Dropped(t, drops)), t)
-
-    def _give_up(self) -> None:
-        self._writer.give_up()
-        self.queue.clear()

@@ -15,7 +15,7 @@ from interfaces.recording.history import AnyEdit, AnyTimeline, edit_entries, pla
 from interfaces.recording.kinds import MOBILE
 from interfaces.recording.recording import Deed, Recording
 from vrs.clock import ManualClock
-from vrs.commands import Cancel, InsertVia, Lateness, Resume, Retime
+from vrs.commands import Cancel, InsertVia, Lateness, Redo, Resume, Retime
 from vrs.engine import Engine
 from vrs.errors import FormatError, VrsError
 from vrs.ledger import Receipt, Standing, Status
@@ -164,7 +164,7 @@ class Rerun:
             return False
         command, answer = entry.command, entry.receipt
         undone = command is None and made is None and answer is not None and answer.command_id <= late.newest
-        resumed = isinstance(command, Resume) and made is not None and made.status is Status.REJECTED
+        resumed = isinstance(command, Resume | Redo) and made is not None and made.status is Status.REJECTED
         of = command.command_id if isinstance(command, Retime | Cancel | InsertVia) else None
         unknown = of is not None and of <= late.newest and of not in self._taken_up
         # What was rejected changed nothing.
@@ -180,7 +180,7 @@ class Rerun:
             return self._engines[-1].refuse(command, "" if entry.receipt is None else entry.receipt.reason)
         if command is None:
             return self._engines[-1].undo()
-        answer: object = self._engines[-1].execute(command)  # type: ignore[arg-type]
+        answer: object = self._engines[-1].execute(command)
         return answer if isinstance(answer, Receipt) else None
 
     def _compare(self, made: tuple[AnyEdit, ...], entry: Deed) -> None:

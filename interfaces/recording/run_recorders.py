@@ -35,7 +35,7 @@ from interfaces.messages.recording import (
 from interfaces.recording.capture import Capture, link_entry
 from interfaces.recording.channels import Message
 from interfaces.recording.mcap_file import RecordingError
-from interfaces.recording.poses import LINK_RATE, POSE_RATE, Paced, real_pose, virtual_pose
+from interfaces.recording.poses import POSE_RATE, Paced, pose_of
 from interfaces.recording.writer import RecordingWriter
 from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Witness
 from interfaces.runs.summary import CAUSES, Attribution, Measures, OffsetOutcome
@@ -73,24 +73,21 @@ class _FileRecorder:
 
     def _put(self, message: Message, *, t: float) -> None:
         """Write a message, if that can be done."""
-        writer = self._writer
-        if writer is not None:
-            self._try(lambda: writer.write(message, t=t))
+        self._try(lambda writer: writer.write(message, t=t))
 
     def _close(self, end: End) -> None:
         """Close the file in order, if that can be done."""
-        writer = self._writer
-        if writer is not None:
-            self._try(lambda: writer.finish(end))
+        self._try(lambda writer: writer.finish(end))
         self._writer = None
 
-    def _try(self, do: Callable[[], None]) -> None:
-        """Do something with the file; a disk that doesn't take it ends the recording."""
+    def _try(self, do: Callable[[RecordingWriter], None]) -> None:
+        """Do something with the file, while there's one; a disk that doesn't take it ends the recording."""
+        writer = self._writer
         try:
-            do()
+            if writer is not None:
+                do(writer)
         except RecordingError as error:
-            self.problem = str(error)
-            writer, self._writer = self._writer, None
+            self.problem, self._writer = str(error), None
             if writer is not None:
                 writer.give_up()
 
@@ -102,7 +99,6 @@ class RunRecorder(_FileRecorder):
         """Record into a file, which is made anew when the run begins."""
         super().__init__(path)
         self._capture: Capture | None = None
-        self._real, self._links = Paced(POSE_RATE), Paced(LINK_RATE)
         self._events: set[RunEvent] = set()
         self._packets: dict[int, CommandPacket] = {}
         self._end = 0.0
@@ -131,11 +127,11 @@ class RunRecorder(_FileRecorder):
         rows = zip(t.tolist(), turn.play.tolist(), turn.q_real.tolist(), turn.q_reference.tolist(), strict=True)
         for now, play, q, reference in rows:
             capture.add(now, RealSample(now, play, q, reference))
-        capture.show(self._real, t, turn.q_real, real_pose)
+        capture.show("real", t, turn.q_real)
         t_virtual, q_virtual = capture.sample(now=turn.now)
         # Both robots have samples at the same times, but for the last ones of a run.
         k = min(len(t), len(t_virtual))
-        capture.show_links(self._links, t[:k], virtual=q_virtual[:k], real=turn.q_real[:k])
+        capture.show_links(t[:k], virtual=q_virtual[:k], real=turn.q_real[:k])
         capture.write_out()
 
     def _tell_event(self, event: RunEvent, t: float) -> None:
@@ -162,8 +158,7 @@ class RunRecorder(_FileRecorder):
             self._tell_event(event, end)
         capture.whole(end)
         capture.write_out()
-        if self._writer is not None:
-            self._try(self._writer.flush)
+        self._try(RecordingWriter.flush)
 
     def finish(self, attributions: Sequence[Attribution] = (), offsets: Sequence[OffsetOutcome] = ()) -> None:
         """Close the file, with what its summary says beside what can be computed from it."""
@@ -308,8 +303,8 @@ class DriveRecorder(_FileRecorder, Witness):
         poses = (capture.kind.poses(capture.model, q) for q in robots.values())
         shown = zip(t, *poses, capture.kind.frames(capture.model, t, robots), strict=True)
         for now, X_virtual, X_real, frames in shown:
-            capture.add(now, virtual_pose(now, X_virtual, capture.kind.frame))
-            capture.add(now, real_pose(now, X_real, capture.kind.frame))
+            capture.add(now, pose_of("virtual", now, X_virtual, capture.kind.frame))
+            capture.add(now, pose_of("real", now, X_real, capture.kind.frame))
             capture.add(now, frames)
 
     def _add_packets(self, direction: Direction, end: float) -> None:

@@ -62,7 +62,7 @@ def render(run: TwinRun, summary: Mapping[str, Any]) -> str:
 
 
 def _facts(run: TwinRun, summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    order = ", then ".join(words(str(cause)) for cause in summary.get("attribution_order", ()))
+    order = ", then ".join(words(str(cause)) for cause in summary["attribution_order"])
     facts = {
         "robot": run.model.name,
         "delay": run.session.delay,

@@ -225,19 +225,9 @@ def _plot(
                     ha="right", color=MUTED)  # fmt: skip
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-        box = ax.get_position()
-    low, high = ax.get_xlim()
-    return Plot(
-        name,
-        title,
-        _inline(buffer.getvalue(), name, title),
-        float(low),
-        float(high),
-        float(box.x0),
-        float(box.x1),
-        note,
-        is_joint,
-    )
+        (low, high), (left, right) = ax.get_xlim(), ax.get_position().intervalx
+    svg = _inline(buffer.getvalue(), name, title)
+    return Plot(name, title, svg, float(low), float(high), float(left), float(right), note, is_joint)
 
 
 def _inline(text: str, name: str, title: str) -> str:

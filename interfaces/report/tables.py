@@ -129,21 +129,18 @@ SCALES: Final = {"mm": 1e3, "%": 100.0}
 
 
 def tiles(summary: Json) -> list[tuple[str, str]]:
-    """The few figures that a reader looks for first, as far as the summary has them: values, and what they are."""
-    timeline = _part(_part(summary, "errors"), "timeline_time")
-    user = _part(_part(summary, "errors"), "user_time")
-    path, commands = _part(summary, "path"), _part(summary, "commands")
-    joint_rms = [x for x in timeline.get("joint_rms_deg") or () if x is not None] or [None]
-    late, lost, behind = commands.get("late"), commands.get("lost"), _part(summary, "behind")
-    shares = [behind.get("mean_s"), summary.get("lag_timeline_s")]
-    played = None if None in shares else " + ".join(map(number, shares))
+    """The few figures that a reader looks for first, as far as they're defined: values, and what they are."""
+    timeline, user = summary["errors"]["timeline_time"], summary["errors"]["user_time"]
+    worst = max((x for x in timeline["joint_rms_deg"] if x is not None), default=None)
+    behind, lag, commands = summary["behind"]["mean_s"], summary["lag_timeline_s"], summary["commands"]
+    played = None if lag is None else f"{number(behind)} + {number(lag)} s"
     found = [
-        (_with_unit(max(joint_rms, key=lambda x: x or 0.0), "deg"), "worst joint, rms, equal timeline time"),
-        (_with_unit(timeline.get("tool_rms_m"), "mm"), "tool, rms, equal timeline time"),
-        (_with_unit(user.get("tool_rms_m"), "mm"), "tool, rms, as the user sees it"),
-        (_with_unit(path.get("time_difference_mean"), "s"), "mean time difference along the path"),
-        (None if played is None else f"{played} s", "network: behind by the clock, mean; control: the joints' lag"),
-        (None if late is None or lost is None else f"{late} / {lost}", "commands late / lost"),
+        (_with_unit(worst, "deg"), "worst joint, rms, equal timeline time"),
+        (_with_unit(timeline["tool_rms_m"], "mm"), "tool, rms, equal timeline time"),
+        (_with_unit(user["tool_rms_m"], "mm"), "tool, rms, as the user sees it"),
+        (_with_unit(summary["path"]["time_difference_mean"], "s"), "mean time difference along the path"),
+        (played, "network: behind by the clock, mean; control: the joints' lag"),
+        (f"{commands['late']} / {commands['lost']}", "commands late / lost"),
     ]
     return [(value, label) for value, label in found if value is not None]
 
@@ -154,14 +151,12 @@ Sheet = tuple[str, Sequence[str], Sequence[Sequence[object]], str, bool]
 
 def figures(summary: Json) -> list[Sheet]:
     """The tables of every figure in a summary, also of those that this module doesn't know by name."""
-    out: list[Sheet] = []
-    if errors := _part(summary, "errors"):
-        out.append(("Errors, real against virtual", *_errors(errors), "", True))
-    if attribution := summary.get("attribution"):
-        order = [str(cause) for cause in summary.get("attribution_order", attribution[0]["parts"])]
+    out: list[Sheet] = [("Errors, real against virtual", *_errors(summary["errors"]), "", True)]
+    if attribution := summary["attribution"]:
+        order = summary["attribution_order"]
         note = f"Counterfactual runs, switched off one after the other: {', then '.join(map(words, order))}."
         out.append(("Where the error comes from (rms)", *_attribution(attribution, order), note, True))
-    if offsets := summary.get("offsets"):
+    if offsets := summary["offsets"]:
         note = (
             "The same messages with the same delays. A fixed offset postpones commands that take longer; an "
             "adaptive one slows the robot down along the committed path. The body follows exactly here, so that "
@@ -169,17 +164,16 @@ def figures(summary: Json) -> list[Sheet]:
         )
         rows = [[_scaled(each[name], "mm" if name.endswith("_m") else "") for name in OFFSETS] for each in offsets]
         out.append(("What the choice of the offset does", tuple(OFFSETS.values()), rows, note, True))
-    if path := _part(summary, "path"):
-        note = "" if (path.get("progress") or 1.0) >= WHOLE else ENDED_SHORT
-        pairs = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
-        out.append(("Tool path and time difference, user time", ("", ""), pairs, note, False))
-    if commands := _part(summary, "commands"):
-        out.append(("Commands", ("", ""), _flat(commands), "", False))
+    path = summary["path"]
+    pairs = [(words(name), _with_unit(value, _path_unit(name))) for name, value in path.items()]
+    short = path["progress"] is not None and path["progress"] < WHOLE
     rest = {name: value for name, value in summary.items() if name not in ELSEWHERE}
-    if rest:
-        note = NOT_MEASURED if rest.get("gap_s") else ""
-        out.append(("The run", ("", ""), _flat(rest), note, False))
-    return out
+    return [
+        *out,
+        ("Tool path and time difference, user time", ("", ""), pairs, ENDED_SHORT if short else "", False),
+        ("Commands", ("", ""), _flat(summary["commands"]), "", False),
+        ("The run", ("", ""), _flat(rest), NOT_MEASURED if summary["gap_s"] > 0 else "", False),
+    ]
 
 
 def receipts(items: Sequence[Receipt]) -> list[tuple[object, ...]]:
@@ -203,26 +197,24 @@ def words(name: str) -> str:
 
 def _errors(errors: Json) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
     columns = [str(key) for key in errors]
-    names: dict[str, None] = {str(name): None for key in columns for name in errors[key]}
     rows: list[list[object]] = []
-    for name in names:
-        values = [errors[key].get(name) for key in columns]
-        unit = _unit(name)
-        size = max((len(v) for v in values if isinstance(v, list)), default=0)
-        if not size:
-            rows.append([_label(name, unit), *(_scaled(v, unit) for v in values)])
-        for j in range(size):
-            label = _label(name.replace("joint_", f"joint_{j + 1}_", 1), unit)
-            rows.append([label, *(_scaled(v[j], unit) if isinstance(v, list) else None for v in values)])
+    for name in errors[columns[0]]:
+        values, unit = [errors[key][name] for key in columns], _unit(name)
+        if isinstance(values[0], list):
+            for j, joint in enumerate(zip(*values, strict=True), 1):
+                label = _label(name.replace("joint_", f"joint_{j}_", 1), unit)
+                rows.append([label, *(_scaled(value, unit) for value in joint)])
+        else:
+            rows.append([_label(name, unit), *(_scaled(value, unit) for value in values)])
     return ("", *(COMPARISONS.get(key, words(key)) for key in columns)), rows
 
 
 def _attribution(items: Sequence[Json], order: Sequence[str]) -> tuple[Sequence[str], Sequence[Sequence[object]]]:
     rows = []
     for item in items:
-        label, scale, unit = MEASURES.get(item["measure"], (words(item["measure"]), 1.0, _unit(item["measure"])))
-        values = [item["total"], *(item["parts"].get(cause) for cause in order), item["residual"]]
-        rows.append([f"{label} [{unit}]", *(None if v is None else scale * float(v) for v in values)])
+        label, scale, unit = MEASURES[item["measure"]]
+        values = [item["total"], *(item["parts"][cause] for cause in order), item["residual"]]
+        rows.append([f"{label} [{unit}]", *(scale * float(value) for value in values)])
     return ("", "total", *map(words, order), "residual"), rows
 
 
@@ -237,11 +229,6 @@ def _flat(values: Json, prefix: str = "") -> list[tuple[str, object]]:
         else:
             rows.append((label, _with_unit(value, _unit(str(name)))))
     return rows
-
-
-def _part(values: Json, name: str) -> Json:
-    part = values.get(name)
-    return part if isinstance(part, Mapping) else {}
 
 
 def _unit(name: str) -> str:

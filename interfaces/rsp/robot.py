@@ -78,7 +78,8 @@ class Telling:
         for index, element in enumerate(model):
             if isinstance(element, Monitor):
                 self.monitors.setdefault(model.index(element.effector), []).append(index)
-        self._measured = ValueOutbox()
+        self.measured = ValueOutbox()
+        """What sensors and monitors say."""
         self._events: dict[int, _Events] = {}
         self._requested: frozenset[int] = frozenset()
         self._bits: frozenset[int] = frozenset()
@@ -87,11 +88,7 @@ class Telling:
         """Begin a session: nothing is known or asked for."""
         self._events.clear()
         self._requested = self._bits = frozenset()
-        self._measured.forget()
-
-    def measure(self, index: int, payload: bytes) -> None:
-        """Set what a sensor or a monitor says."""
-        self._measured.put(index, payload)
+        self.measured.forget()
 
     def occur(self, index: int, payload: bytes) -> bool:
         """Tell of an event; returns whether it will be told: somebody asked for it, and not too many wait."""
@@ -113,16 +110,12 @@ class Telling:
         asked = frozenset().union(
             bits - self._members.keys(), *(self._members[i] for i in bits & self._members.keys())
         )
-        self._measured.forget(asked - self._requested)
+        self.measured.forget(asked - self._requested)
         self._requested = asked
-
-    def heard(self, last: int) -> None:
-        """Take the newest of our packets that the local system has."""
-        self._measured.acknowledge(last)
 
     def fill(self, payloads: dict[int, bytes], packet: int) -> None:
         """Add what is to be told to a packet of a number."""
-        self._measured.fill(payloads, packet, self._measured.unknown & self._requested)
+        self.measured.fill(payloads, packet, self.measured.unknown & self._requested)
         for index, events in self._events.items():
             if events.waiting:
                 payloads[index] = events.waiting[0]
@@ -192,7 +185,8 @@ class RobotCore(SessionCore[RobotOutput]):
         """The session that has the robot."""
         self._over: SessionClaim | None = None
         """The last session that ended: whoever didn't hear that asks again."""
-        self._stopping = False
+        self.stopping = False
+        """Whether the robot has to come to rest before a new session's packets count: answer with `rested`."""
         self._telling = Telling(model, self._config.repeats)
         self._answers: list[tuple[bytes, bytes]] = []
         self._changed: set[int] = set()
@@ -224,16 +218,11 @@ class RobotCore(SessionCore[RobotOutput]):
         """ID of the session in force; None without one."""
         return None if self.claim is None else self.claim.session.id
 
-    @property
-    def stopping(self) -> bool:
-        """Whether the robot has to come to rest before a new session's packets count: answer with `rested`."""
-        return self._stopping
-
     # What the body says.
 
     def measure(self, index: int, payload: bytes) -> None:
         """Set what a sensor says, as it is on the wire."""
-        self._telling.measure(index, payload)
+        self._telling.measured.put(index, payload)
 
     def occur(self, index: int, payload: bytes) -> bool:
         """Tell of an event, its values as they are on the wire; returns whether it will be told.
@@ -244,7 +233,7 @@ class RobotCore(SessionCore[RobotOutput]):
 
     def rested(self) -> None:
         """The body is at rest: a new session's packets count from now on."""
-        self._stopping = False
+        self.stopping = False
 
     def effectors(self, *, now: float) -> dict[int, Values]:
         """What effectors are to do from now on [s], of those for which it changed; the watchdog is looked at."""
@@ -288,7 +277,7 @@ class RobotCore(SessionCore[RobotOutput]):
         body, number = claim.session.take(head, data)
         if claim not in (self.claim, self._over):
             self._begin(claim, now)
-        if self._stopping and claim is self.claim:
+        if self.stopping and claim is self.claim:
             raise PacketDropped(DropReason.STOPPING)
         if head.type is PacketType.END:
             claim.session.newest = number
@@ -320,7 +309,7 @@ class RobotCore(SessionCore[RobotOutput]):
             over = old.session
             self._answers += [(over.make(PacketType.ENDED, b"", now), old.address) for _ in range(3)]
             self._end(EndReason.TAKEN, now)
-            self._stopping = True
+            self.stopping = True
         self.door.pending, self.claim = None, claim
         self._reset(now)
         self.waiting_outputs.append(Began(claim.session.id))
@@ -377,7 +366,7 @@ class RobotCore(SessionCore[RobotOutput]):
             self._find(told)
         last = claim.session.acknowledged(head)
         self._inbox.heard(last)
-        self._telling.heard(last)
+        self._telling.measured.acknowledge(last)
         self.packet_round_trip.acknowledged(last, now)
         if head.buffers != self._clears:
             self._clears = head.buffers

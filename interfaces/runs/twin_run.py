@@ -200,7 +200,7 @@ def carried_out(
         if command is not None and receipt is not None and not isinstance(command, Retime | Cancel | InsertVia):
             engine.count_from(receipt.command_id - 1)
         with suppress(VrsError):
-            engine.undo() if command is None else engine.execute(command)  # type: ignore[arg-type]
+            engine.undo() if command is None else engine.execute(command)
     return engine.timeline
 
 

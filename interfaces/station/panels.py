@@ -33,8 +33,8 @@ class Offer(StrEnum):
 class Panel:
     """A part of the page.
 
-    Its script is `static/NAME.js`, a module that exports the component `Panel`; or, before it's made one, `mount(station,
-    box)`, which is called with the panel's own element.
+    Its script is `static/NAME.js`, a module that exports the component `Panel`; or, before it's made one,
+    `mount(station, box)`, which is called with the panel's own element.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Panel:
 PANELS: Final[tuple[Panel, ...]] = (
     Panel("pane", "3D view", "pane", of=Offer.POLYNOMIALS),
     Panel("floor", "3D view", "pane", of=Offer.ARCS),
-    Panel("drag", "Dragging the tool", "nowhere", of=Offer.POLYNOMIALS),
+    Panel("drag", "Dragging the tool", "pane", of=Offer.POLYNOMIALS),
     Panel("link", "Connection", "header"),
     Panel("control", "Control", "header"),
     Panel("theme", "Light or dark", "header"),

@@ -158,20 +158,20 @@ class Recordings:
         shown = bearer(request.headers.get("authorization", ""))
         try:
             if refusal := self._access.refusal(Role.VIEWER, shown):
-                return _said(403, refusal)
-            ask = msgspec.json.decode(await _body(request), type=_RecordAsk)
+                return said(403, refusal)
+            ask = msgspec.json.decode(await body(request, LARGEST), type=_RecordAsk)
             role = Role.VIEWER if ask.do == "copy" else Role.OPERATOR
             if refusal := self._access.refusal(role, shown):
-                return _said(403, refusal)
+                return said(403, refusal)
             if not self._asked[role].take(self._clock.now()):
-                return _said(429, "too many requests: try again in a moment")
+                return said(429, "too many requests: try again in a moment")
             return JSONResponse(await self._do(ask), 200, HEADERS)
         except ClientDisconnect:
-            return _said(408, "the request didn't come to its end in time")
+            return said(408, "the request didn't come to its end in time")
         except msgspec.MsgspecError:
-            return _said(400, "this isn't a request that is known here")
+            return said(400, "this isn't a request that is known here")
         except VrsError as error:
-            return _said(409 if isinstance(error, RecordingError) else 400, str(error))
+            return said(409 if isinstance(error, RecordingError) else 400, str(error))
 
     async def _do(self, ask: _RecordAsk) -> dict[str, Any]:
         match ask.do:
@@ -233,9 +233,9 @@ class Recordings:
     async def _copy(self, request: Request) -> Response:
         path, until = self._tickets.pop(request.path_params["ticket"], (None, 0.0))
         if path is None or self._clock.now() > until:
-            return _said(404, "not here, or not any more")
+            return said(404, "not here, or not any more")
         if self.sent >= SENT_AT_ONCE:
-            return _said(503, "too many downloads at once: try again")
+            return said(503, "too many downloads at once: try again")
         return _Copy(self, path)
 
 
@@ -254,19 +254,20 @@ class _Copy(FileResponse):
             self._counted.sent -= 1
 
 
-async def _body(request: Request) -> bytes:
+async def body(request: Request, most: int) -> bytes:
     """A request's body.
 
     Raises:
-        InvalidValueError: If it's too long.
+        InvalidValueError: If it's longer than so many bytes.
     """
     found = b""
     async for part in request.stream():
         found += part
-        if len(found) > LARGEST:
-            raise InvalidValueError("request", "more", f"up to {LARGEST} bytes")
+        if len(found) > most:
+            raise InvalidValueError("request", "more", f"up to {most} bytes")
     return found
 
 
-def _said(status: int, text: str) -> Response:
+def said(status: int, text: str) -> Response:
+    """An answer that says why something isn't done."""
     return JSONResponse({"problem": text}, status, HEADERS)

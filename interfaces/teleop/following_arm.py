@@ -247,7 +247,7 @@ class FollowingArm(RobotSite[Orders, Report]):
         try:
             self.engine.count_from(entry.command_id)
             command = entry.command
-            answer = self.engine.undo() if command is None else self.engine.execute(command)  # type: ignore[arg-type]
+            answer = self.engine.undo() if command is None else self.engine.execute(command)
         except VrsError:
             self.parted = True
             return

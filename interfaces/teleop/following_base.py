@@ -10,7 +10,6 @@ from typing import Annotated
 from typing_extensions import override
 
 from interfaces.messages.control import SensedPoints
-from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import Doing, Errand, TaskReport
 from interfaces.messages.sites import DriveOrders, DriveReport
 from interfaces.teleop.architectures import ArchitectureRobotSite, TimelineController
@@ -160,10 +159,10 @@ class FollowingBase(RobotSite[DriveOrders, DriveReport]):
     def _watch(self, now: float) -> None:
         if self._unattended and not self.doing:
             self._halt(f"{LOST}, and it has carried on to the end", now)
-        silent = self._newest is not None and now >= self._newest[2] + self.config.lost_after
-        if self.watchdog is None and self.doing and silent:
+        if self.watchdog is not None:
+            super()._watch(now)
+        elif self.doing and self._newest is not None and now >= self._newest[2] + self.config.lost_after:
             self._lose(now)
-        super()._watch(now)
 
     @property
     @override
@@ -229,7 +228,7 @@ class FollowingBase(RobotSite[DriveOrders, DriveReport]):
         autonomy = self.autonomy
         player = site.controller if site is not None and isinstance(site.controller, TimelineController) else None
         return DriveReport(
-            epoch=Epoch(self.epoch) if self.epoch else None,
+            epoch=self.epoch or None,
             number=self._reports,
             sent_at=now,
             measured_at=self._driven_at,

@@ -12,6 +12,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from interfaces.link.quantiles import LARGEST, SlidingQuantiles
 from interfaces.messages import Refusal, RefusalCode
+from interfaces.messages.fields import Epoch
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.sites import Sample, SiteReport
 from vrs.engine import Engine
@@ -171,7 +172,7 @@ class OperatorSite(Generic[V_co]):
         """The virtual robot."""
         self.listener: SiteObserver[Any, Any] | None = None
         """Who is told of all that happens here."""
-        self.epoch = 1
+        self.epoch = Epoch(1)
         self.halted = halted
         """Why the real robot doesn't follow; None while it does."""
         self.gone = ""
@@ -265,5 +266,5 @@ class OperatorSite(Generic[V_co]):
 
     def begin(self) -> None:
         """Count the next epoch: what the virtual robot says from now on is of that one, and is followed."""
-        self.epoch += 1
+        self.epoch = Epoch(self.epoch + 1)
         self.halted = None

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Generic, TypeVar
+from typing import Annotated, ClassVar, Generic, Literal, TypeVar
 
 from interfaces.link.delays import share_of
 from interfaces.link.quantiles import SlidingQuantiles
+from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import SiteOrders
 from robots.onboard.watchdog import BeginStop, Stamp, StopReason, Verdict, Watchdog, WatchdogConfig, WatchdogState
 from vrs.checks import validated, within
@@ -41,7 +42,7 @@ class RobotSite(ABC, Generic[O, R]):
             now: [s].
             reported: Number of the newest report of an earlier life, which the operator may know.
         """
-        self.epoch = 0
+        self.epoch: Epoch | Literal[0] = 0
         """That it follows; 0 before the first."""
         self.halted = ""
         """Why it stopped by itself; empty while it follows the operator."""

@@ -13,7 +13,6 @@ from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
 from interfaces.messages import Refusal
-from interfaces.messages.fields import Epoch
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.requests import check_crosses
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
@@ -87,9 +86,7 @@ class LoggedEngine(Engine):
             return super().execute(command)
         with self.atomic():
             refused, newest = self._refusal(), self.newest
-            answer: Receipt | None = (
-                super().execute(command) if refused is None else self.refuse(command, *refused)  # type: ignore[arg-type]
-            )
+            answer: Receipt | None = super().execute(command) if refused is None else self.refuse(command, *refused)
             self._tell(CommandRecord(0, self.now(), command, answer, refused is not None), newest)
             return answer
 
@@ -300,7 +297,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         # A robot that knows that it has halted isn't told.
         halted = "" if report is None or report.halted else text_of(site.halted)
         facts = self.log.count, now, self._began, heard, entries, wanted, halted
-        return Orders(Epoch(site.epoch), number, now, *facts)
+        return Orders(site.epoch, number, now, *facts)
 
     @override
     def next_deadline(self) -> float:
@@ -403,7 +400,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
             clock.set(max(entry.at, clock.now()))
             try:
                 if entry.command is not None:
-                    expected.execute(entry.command)  # type: ignore[arg-type]
+                    expected.execute(entry.command)
             except VrsError:
                 continue
         if _differs(self.engine.timeline, expected.timeline, now):

@@ -13,10 +13,9 @@ from typing_extensions import override
 from interfaces.link.delivery import Outgoing
 from interfaces.messages import Order, Outcome, RefusalCode
 from interfaces.messages.control import HOLDS, SensedPoints
-from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import HALT, Doing, Errand, RobotTask, TaskReport
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import ArcPacket, DriveOrders, DriveReport, Sample, arc_rows
+from interfaces.messages.sites import ArcPacket, DriveOrders, DriveReport, Sample
 from interfaces.teleop.architectures import ArchitectureOperatorSite, OperatorSurroundings, Transport
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.deviation import Deviation, PathDeviation
@@ -98,7 +97,7 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
 
     def _set(self, posture: Posture, now: float) -> None:
         """Begin a drive at a posture."""
-        self.began, self.start = now, posture
+        self.began, self.start = now, Posture(*map(normal, posture))
         self.steps = self._over = 0
         self.architecture = ArchitectureOperatorSite(
             self._model, posture, self._transport, start=now, surroundings=self._around(posture)
@@ -288,9 +287,9 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
             if (not site.halted or self._over) and not self._prompt:
                 return None
             # That a drive is over is said at once.
-            packet = ArcPacket((), self.began)
+            packet = ArcPacket()
         behind = site.report is not None and (site.report.epoch or 0) < site.epoch
-        if site.cause in {None, HaltCause.BY_ITSELF} and site.report is not None and behind:
+        if behind and site.report is not None and site.cause in {None, HaltCause.BY_ITSELF}:
             usual = site.round_trips.quantile(0.95) or 0.0
             if now > self.began + EPOCH_TIMEOUT + 2.0 * usual:
                 site.halted = None
@@ -303,14 +302,14 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         begins = site.cause is HaltCause.BY_ITSELF and behind
         start = None if site.halted is not None and not begins else self.start
         return DriveOrders(
-            epoch=Epoch(site.epoch),
+            epoch=site.epoch,
             number=number,
             sent_at=now,
             began=self.began,
-            complete_until=packet.complete_until - self.began,
-            start=None if start is None else Posture(*map(normal, start)),
-            runs=tuple((first, arc_rows(arcs, self.began)) for first, arcs in packet.runs),
-            tail=arc_rows(packet.tail, self.began),
+            complete_until=packet.complete_until,
+            start=start,
+            runs=packet.runs,
+            tail=packet.tail,
             errands=tuple(islice(self._errands.waiting.values(), ERRANDS)),
         )
 
@@ -332,12 +331,12 @@ class VirtualBase(VirtualRobot[DriveOrders, DriveReport]):
         if self.ended:
             return self.architecture.repeat()
         if self.site.halted and self.stands:
-            return ArcPacket((), self.began)
+            return ArcPacket()
         here = self.architecture.posture
         packet = self.architecture.drive(wished.v, wished.w, now=t)
         if self._matched:
             self.path.add(known_arc(t, self._model.period, here, *self.architecture.before))
-        return ArcPacket((), self.began) if self.site.halted else packet
+        return ArcPacket() if self.site.halted else packet
 
     def _braked(self) -> Drive:
         """The next command on the way to rest, along the arc."""

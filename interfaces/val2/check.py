@@ -14,7 +14,7 @@ from interfaces.val2.compiler import compiled_step
 from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.expressions import WANTED, Closure, kind_of
+from interfaces.val2.expressions import Closure, kind_of
 from interfaces.val2.functions import UNRESERVED, row_of
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
@@ -107,9 +107,9 @@ class _Names:
         """Names that are set, by the programs whose own they are, and the kinds of what they're set to; the empty
         name stands for all programs."""
         for source, unreadable, words in read:
-            for kind, entries in (("frame", source.locations), ("real", source.reals), ("string", source.strings)):
-                for entry in entries:
-                    self._set[""][entry.variable.name].add(kind)
+            for entry in source.values:
+                kind = {float: "real", str: "string"}.get(type(entry.value), "frame")
+                self._set[""][entry.variable.name].add(kind)
             for program in source.programs:
                 self._gather(self.programs.setdefault(program.name, program))
                 self._unknown |= {program.name} if program.at.line in unreadable else set()
@@ -161,12 +161,12 @@ class _Checker(ProgramCompiler):
         super().__init__(program, names.context, Structure(found.labels, jumps, blocks))
         self._names, self._usable, self._unreadable = names, names.usable(program), unreadable
         parameters = {parameter.name for parameter in program.parameters}
-        self._known = {
+        self.known = {
             name: next(iter(kinds))
             for name, kinds in self._usable.items()
             if len(kinds) == 1 and name not in parameters
         }
-        self._known = {name.lower(): row.gives for name, row in UNRESERVED.items()} | self._known
+        self.known = {name.lower(): row.gives for name, row in UNRESERVED.items()} | self.known
         """Kinds of names without a prefix."""
         self._reported: set[str] = set()
         self._warnings: list[ValError] = []
@@ -203,7 +203,7 @@ class _Checker(ProgramCompiler):
     @override
     def of_kind(self, kind: str, e: Expression) -> Closure:
         """A closure of an expression, after what is wrong with it has been noted."""
-        error = _mistake(kind, e, self._known)
+        error = _mistake(kind, e, self.known)
         if error is not None:
             self._errors.append(error)
             return _nothing
@@ -292,7 +292,7 @@ def _strange_angles(source: SourceFile, *, said: bool) -> Iterator[CheckFinding]
         source: The file.
         said: Whether somebody has said which they are; else instructions that V+ alone has look like it, too.
     """
-    angles = [(entry.second, entry.variable.at, source.dialect) for entry in source.locations]
+    angles = [(entry.second, entry.variable.at, source.dialect) for entry in source.of("locations")]
     words: list[Instruction] = []
     for program in source.programs:
         for i in (step.statement for step in program.steps):
@@ -338,13 +338,6 @@ def _written(i: Instruction) -> Iterator[Variable]:
                         yield target
 
 
-_FITS: Final[Mapping[str, tuple[str, ...]]] = {
-    "string": ("string",), "frame": ("frame",), "point": ("point",), "location": ("frame", "point", "location"),
-}  # fmt: skip
-_UNTOLD: Final = ("any", "alike", "variable", "array", "name", "label", "program", "text")
-"""What may be of any kind, or is told elsewhere."""
-
-
 def _range(low: float, high: float, allowed: str) -> Callable[[float], None]:
     def require_valid(value: float) -> None:
         if not low <= value <= high:
@@ -364,8 +357,6 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     **{what: _range(n[0], n[-1], f"a {what}, {n[0]} to {n[-1]}") for what, n in NUMBERS.items()},
 }
 """What numbers that are written down have to be."""
-_STANDING: Final = ("HERE", "DEST")
-"""Functions that give joints where a precision point is wanted."""
 
 
 def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | None:
@@ -376,17 +367,12 @@ def _mistake(asked: str, e: Expression, known: Mapping[str, str]) -> ValError | 
         e: The expression.
         known: What is known of names without a prefix.
     """
-    value, kind = literal(e) if asked in _CHECKS else None, kind_of(e, known)
+    value = literal(e) if asked in _CHECKS else None
     if value is not None:
         try:
             _CHECKS[asked](value)
         except ValError as error:
             return error.at(place=e.at)
-    if asked == "point" and isinstance(e, Apply) and e.function in _STANDING:
-        kind = "point"
-    if kind and asked not in _UNTOLD and kind not in _FITS.get(asked, ("real",)):
-        detail = f"{WANTED[kind]} where {WANTED.get(asked, WANTED['real'])} is wanted"
-        return ValError("Mixed types", detail, place=e.at)
     if isinstance(e, Apply) and row_of(e).alike and {"real", "string"} == {kind_of(p, known) for p in children(e)}:
         return ValError("Mixed types", f"a number and a string with {e.function} between them", place=e.at)
     return None

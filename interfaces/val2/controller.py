@@ -15,10 +15,9 @@ from typing import Final
 from typing_extensions import override
 
 from interfaces.val2.compiler import compiled, runs_beside_program, standalone_error
-from interfaces.val2.context import Code, Context, Event, ProgramFailed, ProgramState, Warned
+from interfaces.val2.context import Code, Context, Event, ProgramFailed, ProgramState, Task, Warned
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import Expressions
-from interfaces.val2.interpreter import Task
 from interfaces.val2.memory import LONGEST_STRING, VariableSlot
 from interfaces.val2.motion.arm import Arm
 from interfaces.val2.signals import SignalRule

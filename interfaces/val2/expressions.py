@@ -8,6 +8,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -71,6 +72,9 @@ def kind_of(expression: Expression, known: Mapping[str, str] = {}) -> str:
 
 class Expressions:
     """Makes closures of the expressions of one program."""
+
+    known: Mapping[str, str] = MappingProxyType({})
+    """Of what kind values of names without a prefix are, as far as that's known beforehand."""
 
     def __init__(
         self,
@@ -170,7 +174,7 @@ class Expressions:
                 return self._function(e)
             number = self.of_kind("real", e)
             return lambda s: number(s) != 0.0
-        own, asked = kind_of(e), kind
+        own, asked = kind_of(e, self.known), kind
         if kind == "any":
             if isinstance(e, Variable) and not own:
                 return self.read(e)
@@ -182,9 +186,9 @@ class Expressions:
         match e:
             case Number(value) | Text(value) if own == kind:
                 return _constant(value)
-            case Variable(prefix=prefix) if prefix == _PREFIXES[kind]:
+            case Variable(prefix=prefix) if prefix == _PREFIXES[kind] and own in ("", kind):
                 return self._typed(e, float if kind == "real" else Transformation) if not prefix else self.read(e)
-            case Variable() if kind == "real":
+            case Variable() if kind == "real" and not own:
                 raise mismatch(e)
             case Compound() if kind == "frame":
                 return self._compound(e)

@@ -16,11 +16,10 @@ import math
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final, Protocol, TypeAlias, TypeVar
+from typing import Any, Final, TypeAlias, TypeVar
 
 from interfaces.val2 import formats
 from interfaces.val2.context import (
-    ARM,
     SLICE,
     SPECIAL,
     Action,
@@ -33,6 +32,7 @@ from interfaces.val2.context import (
     Typed,
     Waiting,
     Warned,
+    until,
 )
 from interfaces.val2.errors import ValError
 from interfaces.val2.expressions import PACKED, Expressions, kind_of, packed
@@ -376,26 +376,6 @@ _CHANGING: Final = {
     "ADC", "DEST", "#DEST", "HAND", "HERE", "#HERE", "IOGET", "IOSTAT", "RANDOM", "SPEED", "STATE", "TIME", "TIMER",
 }  # fmt: skip
 """Functions whose values change with time alone."""
-
-
-class _Look(Protocol):
-    """A look at the arm: `ready`, the last motion has begun, or `settled`, it stands."""
-
-    def __call__(self, *, now: float) -> bool: ...
-
-
-def until(context: Context, look: _Look) -> Pause[None]:
-    """Wait until what was asked is answered, and the arm is as it's to be.
-
-    Args:
-        context: Of the arm.
-        look: `ready` or `settled` of the arm.
-
-    Raises:
-        ValError: If what was asked was refused.
-    """
-    while not context.arm.answered(now=context.now) or not look(now=context.now):
-        yield ARM
 
 
 def _moving(context: Context, ask: Ask, following: int) -> Generator[float, None, int]:

@@ -23,8 +23,8 @@ LONGEST_STRING: Final = 1_024
 Key: TypeAlias = int | tuple[int, ...]
 Slots: TypeAlias = list[Any]
 """Of a call: a `VariableSlot` for each name, then what FOR keeps."""
-KINDS: Final = {"real": float, "string": str, "location": Transformation, "point": PrecisionPoint}
-"""Types of values by the words of `Memory.listing`."""
+KINDS: Final[dict[str, Any]] = {"locations": (Transformation, PrecisionPoint), "reals": float, "strings": str}
+"""Types of values."""
 
 
 class VariableSlot:
@@ -220,11 +220,6 @@ class Memory:
                 if value is not None:
                     keys = key if isinstance(key, tuple) else (key,)
                     yield Variable(name, tuple(Number(float(k)) for k in keys)), value
-
-    def listing(self, kind: str) -> list[tuple[str, Value]]:
-        """Names, as they're written, and values of a kind: `real`, `string`, `location` or `point`."""
-        type_ = KINDS[kind]
-        return [(shown(v.name, _key(v)), value) for v, value in self.variables() if type(value) is type_]
 
 
 def _key(variable: Variable) -> Key | None:

@@ -19,7 +19,6 @@ from interfaces.val2.context import (
     ProgramFailed,
     ProgramPaused,
     ProgramState,
-    SignalChanged,
     Traced,
     Typed,
     Warned,
@@ -28,6 +27,7 @@ from interfaces.val2.controller import STATEMENT, TURN, Controller
 from interfaces.val2.corrections import Corrections, Corrector
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
 from interfaces.val2.motion import Arm, EngineRobot
+from interfaces.val2.printer import print_step
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
 from vrs.clock import ManualClock
@@ -156,14 +156,10 @@ class Player:
                     self._ended |= task == 0
                 elif not self.done and not self._go_on(task, now, True):
                     self._listeners.warned(f"{word} in program {program} before step {step}: nobody proceeds")
-            case Traced(program, step, line):
-                self._listeners.warned(f"{program} {step}: {line}")
+            case Traced(program, number, done):
+                self._listeners.warned(f"{program} {number}: {print_step(done)}")
             case ProgramEnded(task=0):
                 self._ended = True
-            case ProgramEnded():
-                pass
-            case SignalChanged():
-                pass
 
     def _go_on(self, task: int, now: float, may: bool) -> bool:
         if self._skips and may:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import Final, TypeAlias
@@ -16,7 +16,7 @@ from typing import Final, TypeAlias
 from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.grammar import name_of, undefined
-from interfaces.val2.memory import MOST_DIMENSIONS
+from interfaces.val2.memory import KINDS, MOST_DIMENSIONS
 from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.signals import SignalRule
@@ -75,18 +75,14 @@ class SourceFile:
 
     name: str
     programs: tuple[Program, ...] = ()
-    locations: tuple[NamedValue, ...] = ()
-    """Transformations and precision points."""
-    reals: tuple[NamedValue, ...] = ()
-    strings: tuple[NamedValue, ...] = ()
+    values: tuple[NamedValue, ...] = ()
     signals: tuple[SignalRule, ...] = ()
     dialect: Dialect = VAL2
     """In which its locations are printed."""
 
-    @property
-    def values(self) -> tuple[NamedValue, ...]:
-        """Of all variables."""
-        return (*self.locations, *self.reals, *self.strings)
+    def of(self, kind: str) -> list[NamedValue]:
+        """The values of one of `KINDS`."""
+        return [entry for entry in self.values if isinstance(entry.value, KINDS[kind])]
 
     @property
     def undefined(self) -> tuple[ValError, ...]:
@@ -147,19 +143,9 @@ def joined(files: Sequence[SourceFile], program: str = "") -> SourceFile:
         known = f"{program}; allowed: {', '.join(programs)}" if programs else "the file holds no program"
         raise ValError("Undefined program name", known)
     first = programs.pop(wanted)
-
-    def latest(entries: Iterable[NamedValue]) -> tuple[NamedValue, ...]:
-        return tuple({entry.variable: entry for entry in entries}.values())
-
-    return SourceFile(
-        files[0].name,
-        (first, *programs.values()),
-        latest(entry for file in files for entry in file.locations),
-        latest(entry for file in files for entry in file.reals),
-        latest(entry for file in files for entry in file.strings),
-        tuple(rule for file in files for rule in file.signals),
-        files[0].dialect,
-    )
+    values = {(type(entry.value), entry.variable): entry for file in files for entry in file.values}
+    rules = tuple(rule for file in files for rule in file.signals)
+    return SourceFile(files[0].name, (first, *programs.values()), tuple(values.values()), rules, files[0].dialect)
 
 
 def with_called(programs: Mapping[str, Program], some: Mapping[str, Program]) -> dict[str, Program]:
@@ -236,7 +222,7 @@ class _File:
     def __init__(self, name: str, dialect: Dialect) -> None:
         self._name, self._dialect = name, dialect
         self._programs: dict[str, Program] = {}
-        self._entries: dict[str, dict[Variable, NamedValue]] = {word: {} for word in _PREFIXES}
+        self._entries: dict[tuple[str, Variable], NamedValue] = {}
         self._rules: list[SignalRule] = []
         self._section = ""
         self._steps: list[Step] = []
@@ -294,7 +280,7 @@ class _File:
             self._rules.append(parse_rule(code, number))
         elif self._section:
             entry = _entry(self._section, code, number, self._dialect)
-            self._entries[self._section][entry.variable] = entry
+            self._entries[self._section, entry.variable] = entry
         elif self._programs:
             raise syntax_error("allowed: .PROGRAM name(arguments)", number, indented(code) + 1)
         else:
@@ -327,9 +313,8 @@ class _File:
 
     def source(self) -> SourceFile:
         """What the file holds."""
-        programs, rules = tuple(self._programs.values()), tuple(self._rules)
-        locations, reals, strings = (tuple(given.values()) for given in self._entries.values())
-        return SourceFile(self._name, programs, locations, reals, strings, rules, self._dialect)
+        programs, values = tuple(self._programs.values()), tuple(self._entries.values())
+        return SourceFile(self._name, programs, values, tuple(self._rules), self._dialect)
 
 
 def _variable(code: str, line: int, prefixes: tuple[str, ...]) -> tuple[Variable, int]:
@@ -402,18 +387,20 @@ def print_rule(rule: SignalRule) -> str:
 
 def print_file(source: SourceFile) -> str:
     """The text of a file; a section without entries is left out. What isn't VAL-II's is told by a directive."""
-    parts, spoken = [], VAL2
+    parts, spoken, located = [], VAL2, source.of("locations")
     for dialect, text in (
         *((program.dialect, print_program(program)) for program in source.programs),
-        (source.dialect if source.locations else spoken, ""),
+        (source.dialect if located else spoken, ""),
     ):
         parts += [f";{_DIRECTIVES[dialect]}\n"] if dialect != spoken else []
         parts.append(text)
         spoken = dialect
-    located = [_row(e, " ".join(map(number, numbers_of(e, source.dialect)))) for e in source.locations]
-    parts.append(_printed(".LOCATIONS", located))
-    parts.append(_printed(".REALS", [_row(e, number(float(e.value))) for e in source.reals]))  # type: ignore[arg-type]
-    parts.append(_printed(".STRINGS", [_row(e, print_expression(Text(str(e.value)))) for e in source.strings]))
+    rows = [_row(e, " ".join(map(number, numbers_of(e, source.dialect)))) for e in located]
+    parts.append(_printed(".LOCATIONS", rows))
+    parts.append(_printed(".REALS", [_row(e, number(float(e.value))) for e in source.of("reals")]))  # type: ignore[arg-type]
+    parts.append(
+        _printed(".STRINGS", [_row(e, print_expression(Text(str(e.value)))) for e in source.of("strings")])
+    )
     parts.append(_printed(".SIGNALS", [print_rule(rule) for rule in source.signals]))
     return "".join(parts)
 

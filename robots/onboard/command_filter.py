@@ -15,8 +15,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Annotated, Generic, TypeVar
 
-from vrs.checks import finite, validated, within
-from vrs.errors import InvalidValueError
+from vrs.checks import not_before, validated, within
 
 Command = TypeVar("Command")
 
@@ -98,11 +97,8 @@ class CommandFilter(Generic[Command]):
         return self._due if self._busy else None
 
     def _time(self, now: float) -> float:
-        now = finite("now", now, "finite seconds")
-        if now < self._now:
-            raise InvalidValueError("now", now, f"{self._now!r} or later: time doesn't run backwards")
-        self._now = now
-        return now
+        self._now = not_before("now", now, self._now, "{} or later: time doesn't run backwards")
+        return self._now
 
     def _run(self, now: float, *, inclusive: bool) -> None:
         while self._due < now or (inclusive and self._due == now):

@@ -8,7 +8,7 @@ knows the measured one, and a mobile robot stops.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
@@ -149,6 +149,8 @@ def _fault(values: object, low: Sequence[float], high: Sequence[float], units: S
     return None
 
 
+_FEW = 8
+"""Numbers that are looked at one by one."""
 _FARTHEST = 1e4
 """No robot takes itself to be further away [m, rad]."""
 
@@ -176,8 +178,13 @@ class SensorWatch:
         Returns:
             Whether all of it is sound; else nobody is to use it.
         """
-        few = values if isinstance(values, tuple) else (values,)
-        if all(type(value) is float and low <= value <= high for value in few):
+        few: Iterable[object] = values if isinstance(values, tuple) else (values,)
+        if isinstance(values, np.ndarray) and values.size <= _FEW:
+            few = values.ravel().tolist()
+        for value in few:
+            if type(value) is not float or not low <= value <= high:
+                break
+        else:
             # Arrays take five times as long for a few numbers.
             return self.note(sensor, "", now=now)
         try:
@@ -201,6 +208,8 @@ class SensorWatch:
     @property
     def fault(self) -> str:
         """What has been bad for `BLIND` seconds, from one reading to another; empty if nothing."""
+        if not self._since:
+            return ""
         lasting = (
             f"the {sensor} reads {bad}"
             for sensor, (since, last, bad) in self._since.items()

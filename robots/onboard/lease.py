@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from robots.onboard.watchdog import LARGEST, whole
-from vrs.checks import finite, validated, within
+from vrs.checks import not_before, validated, within
 from vrs.errors import InvalidValueError
 
 _NAME = 100
@@ -258,8 +258,7 @@ class Lease:
         self._ended = Ended(self._epoch, self._holder, why, now)
 
     def _check(self, now: float) -> None:
-        if finite("now", now, "finite seconds") < self._now:
-            raise InvalidValueError("now", now, f"at or after the present, {self._now} s")
+        not_before("now", now, self._now, "at or after the present, {} s")
 
 
 def _named(holder: object) -> bool:

@@ -4,7 +4,7 @@ A path has its own sense: s grows along it, θ_d is the direction in which it's 
 its heading + π), and what lies on the left of that direction has a positive l. A *stretch* is driven without
 standing: it ends where the path pivots, reverses or ends.
 
-The path generator restores the moving path of the virtual robot from its commands.
+`MovingPath.drive` is the path generator: it restores the moving path of the virtual robot from its commands.
 
 Source: Han, Kim, Kim, Kim, section 3.1; the exact arcs are their eq. (4)–(5).
 """
@@ -179,6 +179,31 @@ class MovingPath:
         last.end = self.end = end
         return True
 
+    def drive(self, v: float, w: float, *, duration: float) -> bool:
+        """Add what a command adds to the virtual robot's path, which is at the end of this one.
+
+        Args:
+            v: Linear speed [m/s].
+            w: Angular speed [rad/s].
+            duration: How long the virtual robot drove it [s].
+
+        Returns:
+            Whether the path had room; if not, it's as it was, and what follows would begin elsewhere: stop, and
+            begin a new path.
+
+        Raises:
+            InvalidValueError: If a value isn't finite, or a time isn't positive.
+        """
+        v = number_in("v", v, -100.0, 100.0, unit=" m/s")
+        w = number_in("w", w, -1000.0, 1000.0, unit=" rad/s")
+        T = number_in("duration", duration, 1e-9, 86_400.0, unit=" s")
+        # Where a speed is tiny, its product with T may be 0 in floating point.
+        if abs(v) <= _PIVOT_RADIUS * abs(w):
+            piece: PathPiece | None = Pivot(w * T) if w * T else None
+        else:
+            piece = Arc(w / abs(v), abs(v) * T, 1 if v > 0 else -1) if abs(v) * T else None
+        return piece is None or self.append(piece, end=Posture(*advanced(self.end, v, w, T)))
+
     def locate(self, posture: tuple[float, float, float]) -> Projection:
         """Find the nearest point ahead of what has been passed; what is before it counts as passed from now on.
 
@@ -273,44 +298,3 @@ def _nearest(piece: _Piece, at: float, x: float, y: float) -> float:
     bent = abs(curvature) > _STRAIGHT
     way = math.atan2(curvature * along, 1 - curvature * left) / curvature if bent else along
     return min(at + max(way, 0.0), piece.amount)
-
-
-class PathGenerator:
-    """Adds to a path what each command adds to the virtual robot's."""
-
-    def __init__(self, path: MovingPath) -> None:
-        """Take the path; the virtual robot is at its end."""
-        self._path = path
-        self.posture = path.end
-        """Where the virtual robot is after the last command."""
-
-    def receive(self, v: float, w: float, *, duration: float) -> bool:
-        """Add a command.
-
-        Args:
-            v: Linear speed [m/s].
-            w: Angular speed [rad/s].
-            duration: How long the virtual robot drove it [s].
-
-        Returns:
-            Whether the path had room; if not, neither it nor the virtual robot's posture has changed, and what
-            follows would begin elsewhere: stop, and begin a new path.
-
-        Raises:
-            InvalidValueError: If a value isn't finite, or a time isn't positive.
-        """
-        v = number_in("v", v, -100.0, 100.0, unit=" m/s")
-        w = number_in("w", w, -1000.0, 1000.0, unit=" rad/s")
-        T = number_in("duration", duration, 1e-9, 86_400.0, unit=" s")
-        if v == 0.0 and w == 0.0:
-            return True
-        posture = Posture(*advanced(self.posture, v, w, T))
-        if abs(v) <= _PIVOT_RADIUS * abs(w):
-            # Where |v| is tiny, w·T may be 0 in floating point only if w is.
-            taken = self._path.append(Pivot(w * T), end=posture) if w * T else True
-        else:
-            length = abs(v) * T
-            taken = self._path.append(Arc(w / abs(v), length, 1 if v > 0 else -1), end=posture) if length else True
-        if taken:
-            self.posture = posture
-        return taken

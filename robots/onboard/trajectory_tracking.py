@@ -25,7 +25,7 @@ from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 from robots.onboard.driving import IPR_LIMITS, STAND, Drive, Posture, kept
-from vrs.checks import finite, validated, within
+from vrs.checks import finite, not_before, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits, advanced, clipped, wrapped
 from vrs.mobile.model import sinc
@@ -299,9 +299,7 @@ class TrajectoryTracker:
         Raises:
             InvalidValueError: If the time runs backwards.
         """
-        now = finite("now", now, "finite seconds")
-        if now < self._now:
-            raise InvalidValueError("now", now, f"{self._now!r} or later: time doesn't run backwards")
+        now = not_before("now", now, self._now, "{} or later: time doesn't run backwards")
         if v_before is not None:
             self._v = v_before
         config = self._config

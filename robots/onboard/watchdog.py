@@ -18,7 +18,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated, TypeAlias
 
-from vrs.checks import finite, validated, within
+from vrs.checks import finite, not_before, validated, within
 from vrs.errors import InvalidValueError
 
 LARGEST = 2**64 - 1
@@ -467,5 +467,4 @@ class Watchdog:
         self._queue.append(GoOn(now, self._epoch))
 
     def _check(self, now: float) -> None:
-        if finite("now", now, "finite seconds") < self._now:
-            raise InvalidValueError("now", now, f"at or after the present, {self._now} s")
+        not_before("now", now, self._now, "at or after the present, {} s")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -40,8 +42,6 @@ CHUNK = 1024
 """Poses solved at a time; their arrays fit into a core's cache."""
 
 _ALLOWED = "finite homogeneous transforms, (k, 4, 4), their rotations orthonormal to 1e-6"
-_SHOULDER = np.array([1.0, -1.0])[:, None, None]
-_ABOVE = np.array([1.0, -1.0])[:, None]
 
 
 def inverse_batch(X: ArrayLike) -> Array:
@@ -69,15 +69,26 @@ def inverse_batch(X: ArrayLike) -> Array:
 def _solved(R: Array, p: Array) -> Array:
     """Return the solutions of rotations, (3, 3, k), and positions, (3, k): (k, 8, 6)."""
     out = np.empty((2, 2, 2, DOF, p.shape[1]))
-    with np.errstate(over="ignore", invalid="ignore"):
-        exists, turns = _arms(p, out)
-        error, M = _placed(p, R, turns)
-        regular, turns = _wrists(M, out)
-        # On the sines and cosines whose angles are returned; one check does for both wrists of an arm,
-        # which differ by exact half turns.
-        exists &= error + _turned(M, turns) <= RESIDUAL_MAX**2
-    good = np.stack((exists, exists & regular), axis=2)
-    np.copyto(out, np.nan, where=~good[:, :, :, None])
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        triangle, closed = _triangles(p)
+        u, sin_e, _ = triangle
+        for (i, righty), (j, above) in product(enumerate((True, False)), repeat=2):
+            first, second = out[i, j]
+            turns = _one_arm(p, triangle, righty, above, first)
+            error, M = _placed(p, R, turns)
+            q4, straight = _fourth(M)
+            turns = _wrists(M, np.where(straight, 0.0, q4), straight, first)
+            first[4] = np.where(straight, np.abs(first[4]), first[4])
+            # On the sines and cosines whose angles are returned; one check does for both wrists of an arm,
+            # which differ by exact half turns.
+            exists = closed & (error + _turned(M, turns) <= RESIDUAL_MAX**2)
+            exists &= (u > 0.0) | righty
+            exists &= (sin_e > 0.0) | above
+            second[:] = first
+            second[4] *= -1.0
+            second[[3, 5]] -= np.copysign(np.pi, first[[3, 5]])
+            np.copyto(first, np.nan, where=~exists)
+            np.copyto(second, np.nan, where=~exists | straight)
     return out.reshape(8, DOF, -1).transpose(2, 0, 1)
 
 
@@ -93,8 +104,8 @@ def _checked(X: ArrayLike) -> tuple[Array, Array]:
     R = rows[:3, :3]
     n, o, a = R.swapaxes(0, 1)
     skew = np.zeros(len(poses))
-    for u, v, product in ((n, n, 1.0), (o, o, 1.0), (a, a, 1.0), (n, o, 0.0), (n, a, 0.0), (o, a, 0.0)):
-        np.maximum(skew, np.abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - product), out=skew)
+    for u, v, dot in ((n, n, 1.0), (o, o, 1.0), (a, a, 1.0), (n, o, 0.0), (n, a, 0.0), (o, a, 0.0)):
+        np.maximum(skew, np.abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - dot), out=skew)
     volume = a[0] * (n[1] * o[2] - n[2] * o[1])
     volume += a[1] * (n[2] * o[0] - n[0] * o[2])
     volume += a[2] * (n[0] * o[1] - n[1] * o[0])
@@ -130,23 +141,13 @@ def inverse_along(X: Array, q: Array, wanted: Asked) -> Array:
         triangle, closed = _triangles(p)
         turns = _one_arm(p, triangle, righty is not False, above is not False, out)
         error, M = _placed(p, R, turns)
-        x, y, z = M[0, 2], M[1, 2], M[2, 2]
-        sin5 = np.sqrt(x * x + y * y)
-        straight = sin5 < MERGE_WRIST
-        q4 = np.arctan2(y, x)
+        q4, straight = _fourth(M)
         if noflip is None:
             free = np.flatnonzero(~straight)
             noflip = not len(free) or bool(np.cos(q4[free[0]] - q[3]) >= 0)
         for i in np.flatnonzero(straight):
             q4[i] = q4[i - 1] if i else q[3] - (0.0 if noflip else np.pi)
-        c4, s4 = np.cos(q4), np.sin(q4)
-        # Joint 5 from the joint 4 that was taken; joint 6 from both, so that rounding in joint 4 cancels.
-        bend = np.where(straight, 0.0, sin5)
-        c5, s5 = _unit(z, -bend)
-        x, y = c4 * M[1, 1] - s4 * M[0, 1], c4 * M[1, 0] - s4 * M[0, 0]
-        c6, s6 = _unit(x, y)
-        error = error + _turned(M, (c4, s4, c5, s5, c6, s6))
-    out[3], out[4], out[5] = q4, np.arctan2(s5, c5), np.arctan2(s6, c6)
+        error = error + _turned(M, _wrists(M, q4, straight, out))
     if not noflip:
         out[3] += np.pi
         out[4] *= -1.0
@@ -213,46 +214,16 @@ def _unit(x: Array, y: Array) -> tuple[Array, Array]:
     return x / h, y / h
 
 
-def _arms(p: Array, out: Array) -> tuple[NDArray[np.bool_], tuple[Array, ...]]:
-    """Fill in joints 1 to 3 of the four arms.
-
-    Args:
-        p: Wrist centres, (3, k) [m].
-        out: Joint values, (2, 2, 2, 6, k) [rad], written.
-
-    Returns:
-        Whether each arm exists, (2, 2, k), and cosine and sine of q1, of q2 and of q2 + q3.
-    """
-    px, py, pz = p
-    (u, sin_e, cos_e), closed = _triangles(p)
-    merged = sin_e == 0.0
-    exists: NDArray[np.bool_] = closed & ((u > 0) | (_SHOULDER > 0)) & (~merged | (_ABOVE > 0))
-
-    u = _SHOULDER * u
-    x, y = px * u - py * D3, py * u + px * D3
-    q1, (c1, s1) = np.arctan2(y, x), _unit(x, y)
-    kx, ky = A2 + FOREARM * cos_e, -_ABOVE * _SHOULDER * (FOREARM * sin_e)
-    x, y = u * kx + pz * ky, pz * kx - u * ky
-    q2, (c2, s2) = np.arctan2(y, x), _unit(x, y)
-    c, s = cos_e * COS_E3, sin_e * COS_E3
-    c3, s3 = c - _ABOVE * (sin_e * SIN_E3), -_ABOVE * s - cos_e * SIN_E3
-    q3 = np.arctan2(s3, c3)
-    c3, s3 = np.stack((c3, c3[::-1])), np.stack((s3, s3[::-1]))
-    out[:, :, :, 0], out[:, :, :, 1] = q1[:, :, None], q2[:, :, None]
-    out[0, :, :, 2], out[1, :, :, 2] = q3[:, None], q3[::-1, None]
-    return exists, (c1, s1, c2, s2, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3)
-
-
 def _placed(p: Array, R: Array, turns: tuple[Array, ...]) -> tuple[Array, Array]:
-    """Return how far the arms miss the wrist centre, squared, (2, 2, k) [m²], and R in their last frames.
+    """Return how far the arms miss the wrist centre, squared, (k,) [m²], and R in their last frames.
 
     Args:
         p: Wrist centres, (3, k) [m].
         R: Rotations, (3, 3, k).
-        turns: Cosine and sine of q1, of q2 and of q2 + q3, (2, 1 or 2, k) each.
+        turns: Cosine and sine of q1, of q2 and of q2 + q3, (k,) each.
 
     Returns:
-        The squares, and the wanted rotations of the wrists, (3, 3, 2, 2, k).
+        The squares, and the wanted rotations of the wrists, (3, 3, k).
     """
     c1, s1, c2, s2, c23, s23 = turns
     u = A2 * c2 + A3 * c23 - D4 * s23
@@ -267,37 +238,40 @@ def _placed(p: Array, R: Array, turns: tuple[Array, ...]) -> tuple[Array, Array]
     return error, M
 
 
-def _wrists(M: Array, out: Array) -> tuple[NDArray[np.bool_], tuple[Array, ...]]:
-    """Fill in joints 4 to 6, noflip first.
+def _fourth(M: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return joint 4 of wrists that aren't flipped, (k,) [rad], and where they're straight, so that it's free."""
+    x, y = M[0, 2], M[1, 2]
+    return np.arctan2(y, x), np.sqrt(x * x + y * y) < MERGE_WRIST
+
+
+def _wrists(M: Array, q4: Array, straight: NDArray[np.bool_], out: Array) -> tuple[Array, ...]:
+    """Fill in joints 4 to 6 of wrists that aren't flipped.
+
+    Joint 5 follows from the joint 4 that was taken; joint 6 from both, so that rounding in joint 4 cancels.
 
     Args:
-        M: Rotations of the last link in the forearm's frame, (3, 3, 2, 2, k).
-        out: Joint values, (2, 2, 2, 6, k) [rad], written.
+        M: Rotations of the last link in the forearm's frame, (3, 3, k).
+        q4: Joint 4, (k,) [rad].
+        straight: Where joints 4 and 6 share an axis, (k,).
+        out: Joint values, (6, k) [rad], written.
 
     Returns:
-        Whether there are two wrists, (2, 2, k), and cosine and sine of the first one's q4, q5 and q6.
+        Cosine and sine of q4, q5 and q6, (k,) each.
     """
+    c4, s4 = np.cos(q4), np.sin(q4)
     x, y, z = M[0, 2], M[1, 2], M[2, 2]
-    sin5 = np.sqrt(x * x + y * y)
-    regular: NDArray[np.bool_] = sin5 >= MERGE_WRIST
-    least = np.maximum(sin5, MERGE_WRIST)
-    c4, s4 = np.where(regular, x / least, 1.0), np.where(regular, y / least, 0.0)
-    q4, q5 = np.arctan2(s4, c4), np.arctan2(np.where(regular, sin5, 0.0), z)
-    c5, s5 = _unit(z, np.where(regular, -sin5, 0.0))
-    x, y = c4 * M[1, 1] - s4 * M[0, 1], c4 * M[1, 0] - s4 * M[0, 0]
-    q6, (c6, s6) = np.arctan2(y, x), _unit(x, y)
-    first, second = out[:, :, 0], out[:, :, 1]
-    first[:, :, 3], first[:, :, 4], first[:, :, 5] = q4, np.where(regular, -q5, q5), q6
-    second[:, :, 3], second[:, :, 4], second[:, :, 5] = q4 - np.copysign(np.pi, q4), q5, q6 - np.copysign(np.pi, q6)
-    return regular, (c4, s4, c5, s5, c6, s6)
+    c5, s5 = _unit(z, -np.where(straight, 0.0, np.sqrt(x * x + y * y)))
+    c6, s6 = _unit(c4 * M[1, 1] - s4 * M[0, 1], c4 * M[1, 0] - s4 * M[0, 0])
+    out[3], out[4], out[5] = q4, np.arctan2(s5, c5), np.arctan2(s6, c6)
+    return c4, s4, c5, s5, c6, s6
 
 
 def _turned(M: Array, turns: tuple[Array, ...]) -> Array:
-    """Return the sum of squares of the differences of M and the wrists' rotations, (2, 2, k).
+    """Return the sum of squares of the differences of M and the wrists' rotations, (k,).
 
     Args:
-        M: Rotations of the last link in the forearm's frame, (3, 3, 2, 2, k).
-        turns: Cosine and sine of q4, q5 and q6, (2, 2, k) each.
+        M: Rotations of the last link in the forearm's frame, (3, 3, k).
+        turns: Cosine and sine of q4, q5 and q6, (k,) each.
     """
     c4, s4, c5, s5, c6, s6 = turns
     c45, s45 = c4 * c5, s4 * c5

@@ -260,6 +260,8 @@ def _commands() -> dict[str, dict[str, Any] | None]:
             "profile": "jerk-limited",
         },
         "undo": None,
+        "redo": {"type": "redo"},
+        "undo what was redone": None,
         "to a pose again": {
             **move,
             "target": {"type": "pose", "X": POSE},
@@ -287,6 +289,7 @@ def _commands() -> dict[str, dict[str, Any] | None]:
         "stop again": {"type": "stop"},
         "steer by an old input": {"type": "steer", "rates": [0.1, 0, 0, 0, 0, 0], "issued_at": 0.0},
         "steer by a twist": {"type": "steer", "twist": [0, 0.05, 0, 0, 0, 0], "frame": "tool"},
+        "redo what isn't there": {"type": "redo"},
     }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from interfaces.cli.main import exit_status
-from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce
+from interfaces.lab import PAPERS, Claim, Findings, Paper, PaperPart, Study, Table, papers, reproduce, reproductions
 from interfaces.lab.claims import Results
 from interfaces.lab.doulgeri import agreement, broadcasting, causality, delays, dragging, encoding, jitter, segments
 from interfaces.lab.output import rich_tables, write
@@ -62,6 +62,16 @@ class TestHouse:
         assert told == ["toy", "toy"]
         assert made.findings.claims[0].measured == 12.0
         assert [claim.claim for claim in made.failed] == ["it's nothing [odd]"]
+
+    @pytest.mark.parametrize("workers", [1, 2])
+    def test_papers_share_the_workers_and_come_in_their_order(self, workers):
+        told = []
+        other = replace(TOY, name="other", parts=(replace(TOY.parts[0], title="other", cases=("5", "7", "9")),))
+        chosen = [(TOY, Study(seed=3)), (other, Study(seed=1)), (TOY, Study(seed=2))]
+        made = list(reproductions(chosen, workers=workers, progress=lambda part: told.append(part.title)))
+        assert [one.paper.name for one in made] == ["toy", "other", "toy"]
+        assert made == [reproduce(paper, study) for paper, study in chosen]
+        assert sorted(told) == ["other"] * 3 + ["toy"] * 4
 
     def test_a_failure_in_a_worker_is_raised_here(self):
         bad = replace(TOY, parts=(replace(TOY.parts[0], cases=("1", "x")),))

@@ -23,6 +23,7 @@ from vrs import (
     MotionCommand,
     PoseTarget,
     Profile,
+    Retime,
     ScaleTime,
     Status,
     SteerCommand,
@@ -418,6 +419,16 @@ def test_edits_of_the_plan_find_it_as_it_was_planned():
     receipt = alone.engine.receipt(number)
     assert np.abs(alone.engine.timeline.final() - receipt.q).max() < 1e-9
     assert receipt.stands
+
+
+def test_an_edit_that_is_refused_leaves_the_offset_as_it_was():
+    alone = Alone()
+    number = alone.line([-0.15, 0.0, 0.0]).command_id
+    follow(alone, lambda _: np.array([0, 0, 4e-3, 0, 0, 0]), begin=0.2, end=0.8)
+    before = alone.engine.timeline
+    for edit in (Retime(number, 3.0), ScaleTime(1000.0), MotionCommand(PoseTarget(np.eye(4)), motion=Motion.LINE)):
+        assert alone.engine.execute(edit).status is Status.REJECTED
+        assert alone.engine.timeline is before
 
 
 def test_jerk_limits_bind_where_the_plan_keeps_them():

@@ -221,7 +221,7 @@ def test_an_edit_of_the_past_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         scheduler.ledger.rewrite(replace(receipt, execute_at=8.0))
         return receipt
 
-    monkeypatch.setattr(Scheduler, "edit", spoil_past)
+    monkeypatch.setattr(Scheduler, "execute", spoil_past)
     with pytest.raises(LawBrokenError, match="the past"):
         watch.execute(Retime(3, 8.0))
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
+from typing_extensions import override
 
 from vrs.commands import DriveCommand, Insertion, Lateness, Stop
 from vrs.errors import PlanningError
 from vrs.insertion import Edit, tail_at
-from vrs.ledger import Ledger, LedgerEntry, Receipt
+from vrs.ledger import Ledger, Receipt
 from vrs.mobile.model import DriveLimits, MobileModel, braking
 from vrs.mobile.timeline import ArcPiece, ArcTimeline
-from vrs.notes import Note, NoteCode, Notes, text_of
-from vrs.scheduler import BaseScheduler
+from vrs.notes import Note, NoteCode, Notes
+from vrs.scheduler import BaseScheduler, Edited
 from vrs.segment import HOLD
 
 _NOWHERE = np.empty(0)
@@ -28,31 +31,28 @@ class DriveScheduler(BaseScheduler[ArcTimeline]):
         self.limits: DriveLimits = model.limits
         self._period = model.period
 
-    def drive(self, command: DriveCommand, now: float | None) -> Receipt:
-        """Carry out a drive command.
+    @override
+    def carry_out(self, command: Edited, now: float | None) -> Receipt:
+        if isinstance(command, Stop):
+            return self._stop(command, now)
+        return self._drive(cast("DriveCommand", command), now)
 
-        Args:
-            command: Its form is sound.
-            now: Present time [s]; None offline.
-        """
-        issued = command.issued_at if command.issued_at is not None else now
-        asked, end = command.execute_at, self.timeline.end
+    def _drive(self, command: DriveCommand, now: float | None) -> Receipt:
+        end = self.timeline.end
         refusal = self.limits.refusal(command.v, command.w)
         if refusal:
-            return self.reject(issued, asked, refusal)
-        try:
-            t, _, _, status, notes = self.beginning(command, now, end)
-        except PlanningError as error:
-            return self.reject(issued, asked, str(error))
+            raise PlanningError(refusal)
+        timing = self.timing(command, now, end)
+        t = max(timing.t, end) if command.execute_at is None else timing.t
         command_id = self.ledger.newest + 1
         edit = self._spliced(t, ArcPiece(command.duration, command.v, command.w, command_id))
         appended = t >= end
         shifted, dropped = ((), ()) if appended else self.touched(edit, t)
-        receipt = Receipt(
-            command_id, status, issued, asked, t, edit.arrival, None, text_of(notes), edit.timeline.version,
-            edit.shift, shifted_names=shifted, superseded_names=dropped,
+        entry = self.entry(
+            command_id, timing, (t, edit.arrival), edit.timeline.version, (), shift=edit.shift,
+            shifted_names=shifted, superseded_names=dropped,
         )  # fmt: skip
-        return self.accept(LedgerEntry(receipt, notes=notes), edit, t, appended=appended)
+        return self.accept(entry, edit, t, appended=appended)
 
     def _spliced(self, t: float, piece: ArcPiece) -> Edit[ArcTimeline]:
         """The past, the new arc, standing while there's slack, and the tail from where the robot then is."""
@@ -67,25 +67,17 @@ class DriveScheduler(BaseScheduler[ArcTimeline]):
         after = timeline.edited(t, pieces, tail, max(scheduled, arrival))
         return Edit(after, t, arrival, _NOWHERE, max(-slack, 0.0), tail, dropped)
 
-    def stop(self, command: Stop, now: float | None) -> Receipt:
+    def _stop(self, command: Stop, now: float | None) -> Receipt:
         """Brake along the present arc and drop what is scheduled."""
-        issued = command.issued_at if command.issued_at is not None else now
-        try:
-            moment = self.moment(command, now, self.timeline.end)
-        except PlanningError as error:
-            return self.reject(issued, command.execute_at, str(error))
-        command_id = self.ledger.newest + 1
-        t = moment.t
+        timing = self.timing(command, now, self.timeline.end)
+        command_id, t = self.ledger.newest + 1, timing.t
         after, notes = self.brake(t, command_id)
-        notes = moment.notes + notes
         edit = Edit(after, t, max(after.end, t), _NOWHERE, dropped=None)
-        receipt = Receipt(
-            command_id, moment.status, moment.issued, moment.asked, t, edit.arrival, None, text_of(notes),
-            after.version,
-            superseded_names=self.touched(edit, t)[1],
-        )  # fmt: skip
-        return self.accept(LedgerEntry(receipt, notes=notes), edit, t)
+        _, names = self.touched(edit, t)
+        entry = self.entry(command_id, timing, (t, edit.arrival), after.version, notes, superseded_names=names)
+        return self.accept(entry, edit, t)
 
+    @override
     def brake(self, t: float, command_id: int) -> tuple[ArcTimeline, Notes]:
         """What is scheduled, with the robot braking along its arc from t [s] on, a command every period."""
         steps = braking(self.timeline.speeds_before(t), self._period, self.limits)

@@ -16,15 +16,11 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vrs.model import Array, Limits
 from vrs.planning.certificate import TOLERANCE, Bounds, bounds, find_violation
 from vrs.planning.plan import TAYLOR, Plan, end_state, integrate, packed
 from vrs.segment import State
-
-_INNER = 4
-"""Where the inner coefficients begin among the points, after the states at the knots."""
 
 
 class Cubics(NamedTuple):
@@ -46,28 +42,9 @@ class Cubics(NamedTuple):
         middle, half = _box(limits, len(self.h))
         distance = self.points - middle
         np.abs(distance, distance)
-        inside = distance <= half
-        # Counting is several times quicker than `all`, and NaN isn't inside.
-        return np.count_nonzero(inside) == inside.size or self._keeps(~inside, bounds(limits))
-
-    def _keeps(self, outside: NDArray[np.bool_], bound: Bounds) -> bool:
-        """Decide by exact extremes where hulls are outside, which is seldom and in few places."""
-        # The knots are points of the curves themselves.
-        if outside[:_INNER].any():
-            return False
-        for point, piece, joint in np.argwhere(outside).tolist():
-            h, (q, qd, qdd, qddd) = float(self.h[piece]), self.points[:_INNER, piece, joint].tolist()
-            if point == _INNER:
-                # The hull of a parabola is wider than it only where it turns within, so the jerk isn't 0.
-                peak = qd - 0.5 * qdd * qdd / qddd if 0.0 < -qdd * qddd < h * qddd * qddd else qd
-                kept = abs(peak) <= bound.qd_max[joint] * (1.0 + TOLERANCE)
-            else:
-                lowest, highest = bound.lowest[joint], bound.highest[joint]
-                turns = [u for u in roots(0.5 * qddd, qdd, qd) if 0.0 < u < h]
-                kept = all(lowest <= q + u * (qd + u * (0.5 * qdd + u * qddd / 6.0)) <= highest for u in turns)
-            if not kept:
-                return False
-        return True
+        # Counting is several times quicker than `all`, and NaN isn't inside. Hulls are outside in few plans.
+        inside = np.count_nonzero(distance <= half) == distance.size
+        return inside or find_violation(self.plan(), limits, jerk=True) is None
 
     def plan(self) -> Plan:
         """The polynomials."""
@@ -171,11 +148,10 @@ def online(start: State, goal: State, speed: float, limits: Limits, *, order: in
         made = None if found is None else _exact(start, goal, *found, order)
         if made is None:
             continue
-        if isinstance(made, Cubics):
-            sure, plan = made.keeps(limits), made.plan()
-        else:
-            sure, plan = False, made
-        problem = None if sure else find_violation(plan, limits, jerk=order == 3)
+        if isinstance(made, Cubics) and made.keeps(limits):
+            return made.plan()
+        plan = made.plan() if isinstance(made, Cubics) else made
+        problem = find_violation(plan, limits, jerk=order == 3)
         if problem is None:
             return plan
         if problem.derivative == 0:
@@ -264,28 +240,25 @@ def _on_one_grid(profiles: list[Any], total: float, order: int) -> tuple[Array, 
         begin = present = 0.0
         # Ruckig gives one acceleration more than times.
         for lasting, value in zip(times, values, strict=False):
-            if lasting > 0.0:
+            if lasting:
                 if value != present:
                     present = value
-                    if begin > _KNOT:
-                        changes.append((begin, joint, value))
-                    else:
-                        current[joint] = value
+                    changes.append((begin, joint, value))
                 begin += lasting
         changes.append((begin, joint, 0.0))
     # Sorting by one float takes half as long as by tuples.
     changes.sort(key=_TIME)
     durations: list[float] = []
     controls: list[float] = []
-    knot = 0.0
+    knot, soon = 0.0, _KNOT
     last = total - _KNOT
     for begin, joint, value in changes:
-        if begin > knot + _KNOT:
+        if begin > soon:
             if begin >= last:
                 break
             durations.append(begin - knot)
             controls += current
-            knot = begin
+            knot, soon = begin, begin + _KNOT
         current[joint] = value
     durations.append(total - knot)
     controls += current

@@ -64,10 +64,11 @@ class Plan:
 def _orders(a: Array) -> list[int]:
     """How many coefficients of each segment aren't leading zeros, at least 1."""
     K = a.shape[1]
-    orders = [K] * len(a)
     # Of few numbers, `any` of a list is ten times quicker than an array's.
-    for i, leading in enumerate(a[:, -1].tolist()):
-        if not any(leading):
+    full = list(map(any, a[:, -1].tolist()))
+    orders = [K] * len(full)
+    if not all(full):
+        for i in [i for i, leads in enumerate(full) if not leads]:
             order = K - 1
             while order > 1 and not any(a[i, order - 1].tolist()):
                 order -= 1

@@ -77,7 +77,7 @@ def replay(acts: tuple[Act, ...], D: float = 0.0) -> Engine:
     engine = Engine(MODEL, q=HOME, clock=clock)
     for act in acts:
         clock.set(max(act.t + D, clock.now()))
-        engine.execute(act.command)  # type: ignore[arg-type]
+        engine.execute(act.command)
     return engine
 
 

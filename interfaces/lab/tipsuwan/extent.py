@@ -24,6 +24,7 @@ from interfaces.lab.tipsuwan.run import (
 from interfaces.lab.tipsuwan.success import MOST_RATIO, succeeds
 from interfaces.link import DelayProfile
 from interfaces.link.delays import CORRELATION_TIME
+from robots.onboard.curve import Curve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -74,12 +75,23 @@ def work(study: Study, case: str) -> dict[float, tuple[str, ...]]:
     """What became of each of the paths at each delay, a letter of `WHY` each, by delay."""
     axis, text = case.split()
     row = varied(axis, float(text), study.length)
-    numbers = [1000 * study.seed + 500 + k for k in range(max(study.runs // 5, 1))]
-    return {tau: tuple(outcome_letter(number, tau, row) for number in numbers) for tau in TAUS}
+    letters: dict[float, list[str]] = {tau: [] for tau in TAUS}
+    for k in range(max(study.runs // 5, 1)):
+        number, known = 1000 * study.seed + 500 + k, dict[Curve, PathMeasures]()
+        for tau in TAUS:
+            letters[tau].append(outcome_letter(number, tau, row, known))
+    return {tau: tuple(found) for tau, found in letters.items()}
 
 
-def outcome_letter(number: int, tau: float, row: MapRow) -> str:
-    """One path at one delay: a letter of `WHY`."""
+def outcome_letter(number: int, tau: float, row: MapRow, known: dict[Curve, PathMeasures]) -> str:
+    """One path at one delay: a letter of `WHY`.
+
+    Args:
+        number: Of the path.
+        tau: Median round trip [s].
+        row: Of the map.
+        known: What becomes of the robot without delay, by path; it's added to.
+    """
     setting, t_pred, correlation_time = row
     curve = s_path(number, NOMINAL_T_PRED) if t_pred is None else s_path(number, t_pred, tau=tau)
 
@@ -87,7 +99,9 @@ def outcome_letter(number: int, tau: float, row: MapRow) -> str:
         return measured(run(curve, agent(control, curve, setting), delay, number, setting=setting))
 
     network = leg(tau, correlation_time)
-    ideal = drive(NetworkControl.DIRECT, no_delay())
+    if curve not in known:
+        known[curve] = drive(NetworkControl.DIRECT, no_delay())
+    ideal = known[curve]
     if not ideal.arrived:
         return "n"
     behind = drive(NetworkControl.EXACT, network)

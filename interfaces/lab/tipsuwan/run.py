@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated, Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -62,6 +63,7 @@ def predicted_time(curve: Curve, tau: float, epsilon: float) -> float:
     return tau / epsilon * float(np.sum(np.diff(s) * 0.5 * (root[1:] + root[:-1])))
 
 
+@lru_cache(maxsize=256)
 def s_path(
     seed: int,
     t_pred: float | None = None,

@@ -1,10 +1,11 @@
 // What the robot sees, says and shows: its camera's picture and sound by RTP, or single pictures, and both its axes.
 import { Gaze } from "./gaze.js";
-import { DEGREES, draw, h, icon, mark, write } from "./dom.js";
-import { held, needs } from "./handling.js";
+import { DEGREES, draw, h, icon, mark, planted, write } from "./dom.js";
+import { Held, Needs } from "./handling.js";
 import { Receiver } from "./receiver.js";
 import { sideLink } from "./sidelink.js";
 import { Stills } from "./stills.js";
+import { html, Icon } from "./ui.js";
 
 const PERIOD = 250;
 const LONGEST = 300;
@@ -51,7 +52,7 @@ export function mount(station, box) {
   const message = h("p.message", { id: "camera-message" });
   const words = h("div.row", {}, text, say, show, clear);
   box.append(stage, h("div.row", {}, rate, angles, h("span.grow"), sound), problem,
-    needs(station, box, "camera-needs"),
+    planted(html`<${Needs} station=${station} id="camera-needs" />`),
     h("div.drive-by", {}, cross, h("p.hint", {}, "Drag the picture, hold a button, or the keys J L I K; C looks ahead.")),
     words, said, h("h2", {}, "On its screen"), message);
   const toast = h("div.robot-screen", { id: "robot-screen", role: "status", hidden: true });
@@ -59,7 +60,7 @@ export function mount(station, box) {
 
   function button(label, symbol, way) {
     const props = { "aria-label": label, title: label };
-    if (way) return held(gaze, "button", props, icon(symbol), () => way);
+    if (way) return planted(html`<${Held} steer=${gaze} source="button" ...${props} input=${() => way}><${Icon} name=${symbol} /><//>`);
     return h("button.held", { type: "button", ...props, onclick: () => gaze.ahead() }, icon(symbol));
   }
 

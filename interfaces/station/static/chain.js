@@ -33,6 +33,28 @@ export function exponential([x, y, z, ...v], q) {
   return X;
 }
 
+/** Angles of no turn, O, A, T [deg], of R = Rz(O − 90°) Ry(A + 90°) Rz(T): VAL-II's, as its WHERE shows them. */
+const NO_TURN = [90, -90, 0];
+/** Sine of the angle between tool and vertical under which O and T can't be told apart. */
+const VERTICAL = 1e-9;
+const DEGREE = Math.PI / 180;
+
+/** O, A, T [deg] of a pose's turn; O and T within ±180°. */
+export function anglesOf(X) {
+  const level = Math.hypot(X[8], X[9]);
+  const turns = level < VERTICAL ? [0, X[10] > 0 ? 0 : Math.PI, Math.atan2(X[1], X[5])]
+    : [Math.atan2(X[9], X[8]), Math.atan2(level, X[10]), Math.atan2(X[6], -X[2])];
+  const [o, a, t] = turns.map((turn, k) => turn / DEGREE + NO_TURN[k]);
+  const wrapped = (angle) => angle - 360 * Math.ceil((angle - 180) / 360);
+  return [wrapped(o), a, wrapped(t)];
+}
+
+/** The pose that turns by O, A, T [deg], at the origin. */
+export function turned(angles) {
+  const screws = [[0, 0, 1, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0]];
+  return screws.map((screw, k) => exponential(screw, (angles[k] - NO_TURN[k]) * DEGREE)).reduce(multiply);
+}
+
 /** A robot's chain. */
 export class Chain {
   /** @param {{home: number[][], screws: number[][], tool: number[]}} described by the server */
@@ -61,6 +83,13 @@ export class Chain {
   /** The tool's point in the base frame [m] at q. */
   toolAt(q) {
     return this.toolOf(this.links(q).at(-1));
+  }
+
+  /** The last link's pose that has the tool's point at a place [m] in the base frame, turned as X. */
+  linkAt(place, X) {
+    const turn = [...X.slice(0, 12), 0, 0, 0, 1];
+    const reach = this.toolOf(turn);
+    return [...turn.slice(0, 12), ...place.map((x, k) => x - reach[k]), 1];
   }
 
   /** The tool's point in the base frame [m], by the last link's pose. */

@@ -1,15 +1,10 @@
 // One picture of a graph by uPlot, with what happened drawn across it, and the time that is looked at.
+import { ACROSS } from "./happenings.js";
 import { theme } from "./theme.js";
 import { clockText, observed } from "./ui.js";
 
 const HEIGHT = 112;
 const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800];
-/** What happened, and how a line across says it: its meaning, colour, dashes. */
-export const ACROSS = {
-  begin: ["a move begins", "--muted", [2, 4]],
-  corrected: ["virtual robot put right", "--committed", []],
-  halted: ["real robot stopped, or lost", "--bad", [6, 3]],
-};
 
 const colours = new Map();
 

@@ -16,7 +16,7 @@ const TRANSPORT = [
   ["to-end", "To the end (End)", "To the end", "M14.6 4H17v12h-2.4zM3 4v12l10-6z"],
 ];
 const KEYS = [
-  ["Space", "play or pause"], ["← →", "a frame back, a frame further"], ["Shift ← →", "a second back, a second further"],
+  ["Space K", "play or pause"], ["← →", "a frame back, a frame further"], ["Shift ← →", "a second back, a second further"],
   ["Page_up Page_down", "ten seconds further, ten seconds back"], ["Home End", "to the start, to the end"],
   ["P N", "to the mark before, to the next mark"], ["− +", "slower, faster"], ["R", "the other way"],
   ["A B O", "the loop begins here, ends here, is off"], ["Shift-drag", "loop a range of the bar"],
@@ -64,7 +64,7 @@ function keysOf(replay, acts) {
   const [slower, faster] = [-1, 1].map((by) => () => setRate(shifted(replay.rate, by)));
   const step = (way) => (shift) => replay.wish("step", { by: way * (shift ? 1 : FRAME) });
   return {
-    " ": acts.play, Home: acts["to-start"], End: acts["to-end"],
+    " ": acts.play, k: acts.play, Home: acts["to-start"], End: acts["to-end"],
     PageUp: () => replay.wish("skip", { by: 10 }), PageDown: () => replay.wish("skip", { by: -10 }),
     ArrowRight: step(1), ArrowLeft: step(-1), "+": faster, "=": faster, "-": slower, "−": slower,
     n: acts["mark-next"], p: acts["mark-back"], r: () => setRate(-replay.rate), a: acts["set-start"], b: acts["set-end"],

@@ -1,4 +1,5 @@
 // Elements of the panels that aren't components.
+import { render } from "./preact.min.js";
 import { OUTLINES } from "./icons.js";
 
 export { DEGREES, clockText, degrees, figure, isTyping } from "./ui.js";
@@ -20,6 +21,13 @@ export function h(tag, props = {}, ...children) {
   }
   element.append(...children.filter((child) => child !== null && child !== undefined));
   return element;
+}
+
+/** A component in an element of its own. */
+export function planted(component) {
+  const place = h("span.planted");
+  render(component, place);
+  return place;
 }
 
 const SVG = "http://www.w3.org/2000/svg";

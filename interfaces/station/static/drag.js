@@ -1,6 +1,5 @@
 // Dragging the tool: a handle at the virtual tool; where it's dropped, the tool goes.
-import { h } from "./dom.js";
-import { steering } from "./steer.js";
+import { html, useEffect, useRef } from "./ui.js";
 
 /** The handle is taken within so many pixels. */
 const REACH = 26;
@@ -10,15 +9,19 @@ const GAIN = 3;
 const THERE = 8e-4;
 const PATIENCE = 12;
 
-export function mount(station) {
-  const { session, chain, shared } = station;
-  const { pane, scene } = shared.pane;
+export function Panel({ station }) {
+  const [handle, goal] = [useRef(null), useRef(null)];
+  useEffect(() => follow(station, handle.current, goal.current), [station.scene]);
+  return html`<div class="handle" id="handle" ref=${handle} aria-hidden="true" title="Drag the tool" hidden></div>
+    <div class="goal" id="goal" ref=${goal} aria-hidden="true" hidden></div>`;
+}
+
+/** Let the handle be taken, and the tool follow it. */
+function follow(station, handle, goal) {
+  const { session, steer, chain, scene } = station;
   if (!scene) return;
-  const steer = steering(station);
+  const { pane } = scene;
   const THREE = window.MeshCat.THREE;
-  const handle = h("div.handle", { id: "handle", "aria-hidden": "true", title: "Drag the tool" });
-  const goal = h("div.goal", { id: "goal", "aria-hidden": "true", hidden: true });
-  pane.parentElement.append(handle, goal);
   /** Where the tool is to go, in the base frame [m]; null while nothing is dragged. */
   let target = null;
   let droppedAt = null;
@@ -26,7 +29,7 @@ export function mount(station) {
   let offset = null;
 
   /** The tool in the base frame [m], as the picture shows it. */
-  const tool = () => (shared.pane.shown ? chain.toolAt(shared.pane.shown) : null);
+  const tool = () => (station.shown ? chain.toolAt(station.shown) : null);
   // The scene's z is up; the camera lives in a frame with y up: (x, y, z) is (x, z, −y) there.
   const seen = ([x, y, z]) => new THREE.Vector3(x, z, -y);
   const back = ({ x, y, z }) => [x, -z, y];
@@ -59,7 +62,7 @@ export function mount(station) {
     const distance = Math.hypot(...way);
     const late = droppedAt !== null && performance.now() / 1000 - droppedAt > PATIENCE;
     if (late || (droppedAt !== null && distance < THERE)) return null;
-    const fastest = shared.jog.share * station.config.robot.tool_speed;
+    const fastest = station.jog.share * station.config.robot.tool_speed;
     const speed = Math.min(fastest, GAIN * distance);
     const scale = distance > 1e-9 ? speed / distance : 0;
     return { twist: [...way.map((x) => x * scale), 0, 0, 0], frame: "base" };
@@ -73,7 +76,7 @@ export function mount(station) {
 
   function take(event) {
     const here = tool();
-    if (event.button !== 0 || !here || shared.pane.cursor !== null || !session.holds) return;
+    if (event.button !== 0 || !here || station.cursor !== null || !session.holds) return;
     const at = project(here);
     const box = pane.getBoundingClientRect();
     if (Math.hypot(event.clientX - box.left - at.x, event.clientY - box.top - at.y) > REACH) return;
@@ -115,7 +118,7 @@ export function mount(station) {
   /** The handle stands at the tool, and the mark where it's to go, in every frame of the picture. */
   function place() {
     const here = tool();
-    const shown = here !== null && session.holds && session.link === "live" && shared.pane.cursor === null;
+    const shown = here !== null && session.holds && session.link === "live" && station.cursor === null;
     put(handle, shown ? project(here) : null);
     put(goal, shown && target !== null ? project(target) : null);
     requestAnimationFrame(place);
@@ -127,6 +130,7 @@ export function mount(station) {
     if (!hidden) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
   }
 
-  shared.drag = { get target() { return target; }, tool, project };
+  /** For tests: where the tool is to go, where it is, and where that is in the picture. */
+  station.drag = { get target() { return target; }, tool, project };
   place();
 }

@@ -1,8 +1,8 @@
 // Driving: by buttons that are held, by keys, by the stick on the page and by a gamepad; and how both robots are.
-import { DEGREES, figure, h, icon, isTyping, write } from "./dom.js";
-import { held, needs, Speed } from "./handling.js";
-import { mountPad } from "./pad.js";
-import { steering } from "./steer.js";
+import { DEGREES, figure, h, isTyping, planted, write } from "./dom.js";
+import { Held, Needs, Speed, SpeedRow } from "./handling.js";
+import { Pad } from "./pad.js";
+import { html, Icon } from "./ui.js";
 
 /** Keys, and the shares of the speeds v and w that they ask for. */
 const KEYS = {
@@ -23,8 +23,7 @@ const PERIOD = 100;
 
 export function mount(station, box) {
   document.head.append(h("link", { rel: "stylesheet", href: "/station/driving.css" }));
-  const session = station.session;
-  const steer = steering(station);
+  const { session, steer } = station;
   /** The buttons, by what they ask for. */
   const buttons = new Map();
   /** Keys that are down, by what they ask for. */
@@ -53,7 +52,8 @@ export function mount(station, box) {
 
   const cross = h("div.cross", { role: "group", "aria-label": "Drive" },
     ...BUTTONS.map((entry) => (entry ? button(...entry) : h("span", { "aria-hidden": "true" }))));
-  const pad = h("div.pad-row");
+  const twist = ([forward, left]) => drive(forward, left);
+  const pad = h("div.pad-row", {}, planted(html`<${Pad} station=${station} twist=${twist} words=${WORDS} />`));
   const facts = h("dl.facts.drive-facts");
   const cells = {};
   for (const [name, label, title] of [
@@ -69,21 +69,18 @@ export function mount(station, box) {
     cells[name] = h("dd", { id: `drive-${name}` }, "–");
     facts.append(h("dt", { title }, label), cells[name]);
   }
-  box.append(needs(station, box, "drive-needs"),
-    speed.row,
+  box.append(planted(html`<${Needs} station=${station} id="drive-needs" />`),
+    planted(html`<${SpeedRow} speed=${speed} />`),
     h("div.drive-by", {}, cross, pad),
     h("p.hint", {}, "Arrow keys or W A S D drive, two at once make a curve; the space bar stops."),
     facts);
-  mountPad(station, pad, steer, { twist: ([forward, left]) => drive(forward, left) }, WORDS);
 
   function button(label, symbol, [forward, left]) {
-    const made = held(steer, "button", { "aria-label": label, title: label }, icon(symbol), () => drive(forward, left));
-    buttons.set(`${forward} ${left}`, made);
+    const made = planted(html`<${Held} steer=${steer} source="button" aria-label=${label} title=${label}
+      input=${() => drive(forward, left)}><${Icon} name=${symbol} /><//>`);
+    buttons.set(`${forward} ${left}`, made.firstChild);
     return made;
   }
-
-  // Arrow keys drive again once the mouse has let go of what takes them too.
-  speed.slider.addEventListener("pointerup", () => speed.slider.blur());
 
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;

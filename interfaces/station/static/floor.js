@@ -1,9 +1,9 @@
 // The 3D view of a mobile robot: both twins in their room, where they drove, what is committed, and how old that is.
 import { busy } from "./tasks.js";
 import { StationScene } from "./twins.js";
+import { html } from "./ui.js";
 import { Viewport } from "./viewport.js";
 
-const PERIOD = 100;
 const LEGEND = [
   ["virtual", "Virtual", "ghost, as driven"],
   ["real", "Real", "solid, as measured"],
@@ -18,31 +18,24 @@ class FloorScene extends StationScene {
   }
 }
 
-export function mount(station, box) {
-  const session = station.session;
-  const viewport = new Viewport(station, box, LEGEND, FloorScene);
-  station.shared.pane = { scene: viewport.scene };
+/** How the picture stands: symbol, words, status. */
+function stands(session) {
+  const { link, state } = session;
+  if (link !== "live" || !state) return ["help", "Nothing known", "none"];
+  if (!state.connected) return ["cloud_off", "Real robot not heard", "lost"];
+  if (state.halted) return ["pause_circle", "Real robot waits", "none"];
+  if (busy(session)) return ["route", "Drives by itself", "confirmed"];
+  if (state.starved) return ["hourglass_empty", "Real robot waits for news", "none"];
+  const later = state.time_difference;
+  if (later == null || later < 0.02) return ["verified", "Real robot is there too", "confirmed"];
+  return ["schedule", `Real robot ${later.toFixed(1)} s behind`, "predicted"];
+}
 
-  /** How the picture stands: symbol, words, status. */
+export function Panel({ station }) {
   function standing() {
-    const { link, state } = session;
-    if (link !== "live" || !state) return ["help", "Nothing known", "none"];
-    if (!state.connected) return ["cloud_off", "Real robot not heard", "lost"];
-    if (state.halted) return ["pause_circle", "Real robot waits", "none"];
-    if (busy(session)) return ["route", "Drives by itself", "confirmed"];
-    if (state.starved) return ["hourglass_empty", "Real robot waits for news", "none"];
-    const later = state.time_difference;
-    if (later == null || later < 0.02) return ["verified", "Real robot is there too", "confirmed"];
-    return ["schedule", `Real robot ${later.toFixed(1)} s behind`, "predicted"];
+    const [symbol, words, status] = stands(station.session);
+    return { symbol, words, status };
   }
 
-  function say() {
-    const [symbol, words, status] = standing();
-    viewport.stand(status, symbol, words);
-    viewport.cover();
-  }
-
-  setInterval(say, PERIOD);
-  station.on("link", say);
-  say();
+  return html`<${Viewport} station=${station} Scene=${FloorScene} legend=${LEGEND} standing=${standing} />`;
 }

@@ -8,18 +8,15 @@ const LASTS = 1;
 export class History {
   constructor(station) {
     this.rows = [];
-    this.instance = null;
+    let run = null;
     station.on("welcome", ({ instance }) => {
-      if (instance !== this.instance) this.rows = [];
-      this.instance = instance;
+      if (instance !== run) this.rows = [];
+      run = instance;
     });
-    station.on("state", (state) => this.add(state));
-  }
-
-  add({ t, q, late }) {
-    for (const [then, joints] of late) this.put(then, joints);
-    this.put(t, q);
-    if (this.rows.length > KEPT + 1000) this.rows.splice(0, 1000);
+    station.on("state", ({ t, q, late }) => {
+      for (const [then, joints] of [...late, [t, q]]) this.put(then, joints);
+      if (this.rows.length > KEPT + 1000) this.rows.splice(0, 1000);
+    });
   }
 
   /** Take a measurement to its place; what came late may come twice. */

@@ -1,7 +1,8 @@
 // The list of jobs: edited, reordered, kept by the server, tried on the virtual robot, and done.
-import { DEGREES, h, icon, isTyping, mark, write } from "./dom.js";
-import { needs } from "./handling.js";
+import { DEGREES, h, icon, isTyping, mark, planted, write } from "./dom.js";
+import { Needs } from "./handling.js";
 import { ask, goalText } from "./tasks.js";
+import { html } from "./ui.js";
 
 /** Kinds of jobs: name, what is written, and how a job is read from its fields. */
 const KINDS = {
@@ -95,7 +96,7 @@ export function mount(station, box) {
   const adding = h("form.job-add", { id: "job-add" }, kind, text, h("button.main", { id: "job-add-it" }, "Add"), program);
   const placeName = h("input", { id: "place-name", "aria-label": "Name of a place", placeholder: "name", maxlength: 40, autocomplete: "off" });
   const keeping = h("form.job-add", { id: "place-add" }, h("span.muted", {}, "Here is"), placeName, h("button", {}, "Keep place"));
-  box.append(needs(station, box, "jobs-needs"), bar, stage, screen, fault, list, empty, adding, keeping, policy);
+  box.append(planted(html`<${Needs} station=${station} id="jobs-needs" />`), bar, stage, screen, fault, list, empty, adding, keeping, policy);
 
   /** The list as it was edited here, until the server has answered the last edit; edits come faster than answers. */
   let draft = null;

@@ -1,142 +1,196 @@
-// Jogging: joints and tool by buttons that are held, by keys, by the stick on the page and by a gamepad; named poses.
-import { degrees, figure, h, isTyping, write } from "./dom.js";
-import { held, needs, Speed } from "./handling.js";
-import { mountPad } from "./pad.js";
-import { steering } from "./steer.js";
+// Jogging: joints and tool by buttons, keys, sliders and typed numbers, by the stick and by a gamepad; poses.
+import { Held, letGo, Needs, SpeedRow } from "./handling.js";
+import { POSE } from "./jogging.js";
+import { Pad } from "./pad.js";
+import { figure, html, Icon, isTyping, useComputed, useEvery, useOn, useRef, useState } from "./ui.js";
 
-/** Keys of the joints, up and down, and of the tool. */
-const UP = ["KeyQ", "KeyW", "KeyE", "KeyR", "KeyT", "KeyY"];
-const DOWN = ["KeyA", "KeyS", "KeyD", "KeyF", "KeyG", "KeyH"];
+/** Keys of the joints, up and down, the seventh to the twelfth in rows of their own; and of the tool. */
+const UP = ["KeyQ", "KeyW", "KeyE", "KeyR", "KeyT", "KeyY", "Digit1", "Digit2", "Digit3", "Digit4", "Digit5", "Digit6"];
+const DOWN = ["KeyA", "KeyS", "KeyD", "KeyF", "KeyG", "KeyH", "KeyZ", "KeyX", "KeyC", "KeyV", "KeyB", "KeyN"];
 const TOOL = {
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [1, 1], ArrowRight: [1, -1], PageUp: [2, 1], PageDown: [2, -1],
   KeyU: [3, 1], KeyJ: [3, -1], KeyI: [4, 1], KeyK: [4, -1], KeyO: [5, 1], KeyL: [5, -1],
 };
 const AXES = ["x", "y", "z", "turn x", "turn y", "turn z"];
-const SPEED = "vrs-speed";
+/** What the keys move, by their codes: "joint" or "tool", which joint or axis, and the sign. */
+export const KEYS = new Map([
+  ...UP.map((code, k) => [code, ["joint", k, 1]]), ...DOWN.map((code, k) => [code, ["joint", k, -1]]),
+  ...Object.entries(TOOL).map(([code, [axis, sign]]) => [code, ["tool", axis, sign]]),
+]);
+const STEPS = [0, 0.1, 1, 5, 10];
+/** Time between two looks at the joints [ms]. */
+const LOOK = 100;
+const TURN = "as VAL-II's WHERE has it, in the base frame: R = Rz(O − 90°) Ry(A + 90°) Rz(T)";
 
-export function mount(station, box) {
-  const session = station.session;
-  const steer = steering(station);
-  const robot = station.config.robot;
-  let joints = [];
-  let frame = "base";
+/** A key as it's written on it. */
+const keyName = (code) => code.replace(/Key|Digit/, "").replace(/(Page|Arrow)(.)/, "$1 $2");
+const keyOf = (what) => keyName([...KEYS].find(([, one]) => String(one) === String(what))[0]);
 
-  const speed = new Speed(SPEED, "30");
+export function Panel({ station }) {
+  const { session, steer, jog } = station;
+  const { welcome } = session;
+  /** The move to what was typed, and in which fields. */
+  const asked = useRef({});
 
-  const shared = (station.shared.jog = {
-    get share() { return speed.share; },
-    get frame() { return frame; },
-    /** A twist of a share of the full speed along, or about, an axis of the tool's frame. */
-    twist(parts) {
-      const scale = (part, k) => part * speed.share * (k < 3 ? robot.tool_speed : robot.tool_turn_speed);
-      return { twist: parts.map(scale), frame };
-    },
-    rates(index, sign) {
-      const most = session.welcome.limits.qd_max;
-      return { rates: most.map((rate, k) => (k === index ? sign * speed.share * rate : 0)) };
-    },
+  useEvery(LOOK, () => {
+    jog.q = station.shown ?? jog.q;
   });
-
-  const bars = h("div.joints", { role: "group", "aria-label": "Joints" });
-  const frames = h("select", { id: "jog-frame", "aria-label": "Frame of the tool's axes" },
-    h("option", { value: "base" }, "base frame"), h("option", { value: "tool" }, "tool frame"));
-  frames.addEventListener("change", () => (frame = frames.value));
-  const axes = h("div.axes", { role: "group", "aria-label": "Tool" });
-  const poses = h("div.poses", { role: "group", "aria-label": "Named poses" });
-  const when = h("select", { id: "when", "aria-label": "When to begin" },
-    h("option", { value: "now" }, "now"), h("option", { value: "append" }, "after the plan"),
-    h("option", { value: "later" }, "in …"));
-  const later = h("input", { id: "later", type: "number", min: 0.5, max: 600, step: 0.5, value: 5, hidden: true,
-    "aria-label": "Seconds from now" });
-  when.addEventListener("change", () => (later.hidden = when.value !== "later"));
-  const pad = h("div.pad-row");
-  const target = h("div.go", {}, h("div", {}, poses, h("div.row.when", {}, h("label", { for: "when" }, "Begin"), when, later)), pad);
-  box.append(
-    needs(station, box, "jog-needs"),
-    speed.row,
-    section("Joints", "keys Q to Y up, A to H down", bars),
-    section("Tool", "arrows, Page Up, Page Down", axes, frames),
-    section("Go to", "", target),
-  );
-  mountPad(station, pad, steer, shared);
-
-  function section(title, hint, content, extra = null) {
-    const head = h("div.head", {}, h("h2", {}, title), hint ? h("span.hint", {}, hint) : null, extra);
-    return h("section", {}, head, content);
-  }
-
-  /** The buttons, by the joint or the axis of the tool and the sign. */
-  const buttons = new Map();
-  function button(what, label, text, input) {
-    buttons.set(what, held(steer, "jog", { "aria-label": label }, text, input));
-    return buttons.get(what);
-  }
-
-  AXES.forEach((name, k) => {
-    const along = (sign) => () => shared.twist([0, 1, 2, 3, 4, 5].map((other) => (other === k ? sign : 0)));
-    const label = k < 3 ? `Tool along ${name}` : `Tool: ${name}`;
-    const keys = Object.entries(TOOL).filter(([, [axis]]) => axis === k).map(([code]) => code.replace("Key", ""));
-    axes.append(h("div.axis", { title: `Keys ${keys.join(" and ")}` }, button(`tool ${k} -1`, label + ", minus", "−", along(-1)),
-      h("span", {}, name), button(`tool ${k} 1`, label + ", plus", "+", along(1))));
-  });
-
-  function build() {
-    const { limits, poses: named, dof } = session.welcome;
-    if (joints.length === dof) return;
-    joints = Array.from({ length: dof }, (_, k) => {
-      const value = h("span.value");
-      const bar = h("i");
-      const name = `Joint ${k + 1}`;
-      bars.append(h("div.joint", {}, h("span.name", {}, "J" + (k + 1)),
-        button(`joint ${k} -1`, name + " down", "−", () => shared.rates(k, -1)),
-        h("span.track", { "aria-hidden": "true" }, bar), value, button(`joint ${k} 1`, name + " up", "+", () => shared.rates(k, 1))));
-      return { value, bar, low: limits.q_min[k], high: limits.q_max[k] };
-    });
-    for (const [name, q] of Object.entries(named)) {
-      poses.append(h("button", { type: "button", "data-pose": name, onclick: () => go(name, q) }, name));
-    }
-  }
-
-  function go(name, q) {
-    const command = { type: "move", target: { type: "joints", q }, speed: speed.share };
-    if (when.value === "now") command.insertion = "replace";
-    else if (when.value === "append") command.insertion = "append";
-    else command.execute_at = session.now + Math.max(0.5, Number(later.value) || 0.5);
-    session.order(command, name);
-  }
-
-  window.addEventListener("keydown", (event) => {
+  useOn(window, "keydown", (event) => {
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;
     if (event.target.closest?.("#strip-box, select, [role=tablist], [role=separator], input, dialog")) return;
-    const [what, input] = keyed(event.code);
-    if (!input || !session.holds) return;
+    const what = KEYS.get(event.code);
+    if (!what || !session.holds || (what[0] === "joint" && what[1] >= welcome.dof)) return;
     event.preventDefault();
-    station.notices.use(buttons.get(what));
-    steer.hold("keys:" + event.code, input);
+    station.notices.use(document.querySelector(`[data-jog="${what.join(" ")}"]`));
+    if (!jog.once(what)) steer.hold("keys:" + event.code, () => jog.held(what));
   });
-  window.addEventListener("keyup", (event) => steer.release("keys:" + event.code));
+  useOn(window, "keyup", (event) => steer.release("keys:" + event.code));
+  useOn(session, "outcome", (entry) => {
+    if (entry !== asked.current.entry || !entry.outcome.receipt || entry.outcome.receipt.status === "rejected") return;
+    jog.settle(asked.current.kind);
+    asked.current = {};
+  });
 
-  function keyed(code) {
-    for (const [codes, sign] of [[UP, 1], [DOWN, -1]]) {
-      const joint = codes.indexOf(code);
-      if (joint >= 0 && joint < joints.length) return [`joint ${joint} ${sign}`, () => shared.rates(joint, sign)];
-    }
-    const [axis, sign] = TOOL[code] ?? [];
-    if (axis === undefined) return ["", null];
-    return [`tool ${axis} ${sign}`, () => shared.twist([0, 1, 2, 3, 4, 5].map((k) => (k === axis ? sign : 0)))];
+  function goTyped(kind, motion) {
+    asked.current = { kind, entry: jog.goTyped(kind, motion) };
   }
 
-  /** The joints of the picture, ten times a second. */
-  setInterval(() => {
-    const q = station.shared.pane?.shown ?? (session.now === null ? null : session.timeline?.joints(session.now));
-    if (!q) return;
-    joints.forEach(({ value, bar, low, high }, k) => {
-      write(value, station.chain.slides(k) ? `${figure(q[k], 3)} m` : degrees(q[k]));
-      bar.style.left = `${Math.max(0, Math.min(100, (100 * (q[k] - low)) / (high - low)))}%`;
-    });
-  }, 100);
+  if (!welcome) return html`<${Needs} station=${station} id="jog-needs" />`;
+  const dof = Math.min(UP.length, welcome.dof);
+  return html`
+    <${Needs} station=${station} id="jog-needs" />
+    <${SpeedRow} speed=${jog.speed}>
+      <select id="jog-step" aria-label="A press is" title="What a press of a button or key does" value=${jog.step}
+        onChange=${({ target }) => (jog.step = Number(target.value))}>
+        ${STEPS.map((step) => html`<option value=${step}>${step ? `${step}° / mm` : "hold"}</option>`)}</select><//>
+    <${Joints} station=${station} dof=${dof} go=${goTyped} />
+    <${Tool} station=${station} go=${goTyped} />
+    <${Poses} station=${station} />`;
+}
 
-  station.addEventListener("cursor", () => box.toggleAttribute("data-blind", steer.blind));
-  station.on("welcome", build);
-  if (session.welcome) build();
+/** A button that jogs. */
+function Jog({ station, what, label, children }) {
+  const { steer, jog } = station;
+  return html`<${Held} steer=${steer} source="jog" aria-label=${label} data-jog=${what.join(" ")} title=${`Key ${keyOf(what)}`}
+    why=${steer.idle} input=${() => jog.held(what)} once=${() => jog.once(what)}>${children}<//>`;
+}
+
+/** Goes to what is typed. */
+function Go({ station, kind, go, children }) {
+  const why = station.idle;
+  return html`<button class="small go" type="button" id=${`go-${kind}`} aria-disabled=${why ? "true" : undefined}
+    title=${why || "Go to what is typed"} onClick=${go}>${children}</button>`;
+}
+
+/** A number as it is, which may be typed: Enter goes there, Escape takes it back. */
+function Field({ jog, kind, k, field: { name, sign, low, high }, label, title, go }) {
+  const shown = useComputed(() => (jog.q ? figure(jog.values(kind, jog.q)[k], 1) : "–"));
+  const typed = jog.typed[name];
+
+  function key(event) {
+    if (event.key === "Enter") go();
+    else if (event.key === "Escape") jog.type(name, undefined);
+  }
+
+  return html`<label class="field" data-typed=${typed === undefined ? undefined : ""} title=${title}>
+    <input id=${`jog-${name}`} inputmode="decimal" autocomplete="off" aria-label=${`${label} in ${sign === "°" ? "degrees" : sign}`}
+      aria-invalid=${jog.wrong === name ? "true" : undefined} value=${typed ?? shown.value} data-low=${low} data-high=${high}
+      onFocus=${({ target }) => target.select()} onInput=${({ target }) => jog.type(name, target.value)} onKeyDown=${key} />
+    <span aria-hidden="true">${sign}</span></label>`;
+}
+
+function Joints({ station, dof, go }) {
+  const { jog } = station;
+  const fields = jog.fields("joints").slice(0, dof);
+  const more = dof > 6 ? `, 1 to ${dof - 6}, Z to ${keyName(DOWN[dof - 1])}` : "";
+  const last = Math.min(6, dof) - 1;
+  return html`<section>
+    <div class="head"><h2>Joints</h2>
+      <span class="hint">keys Q to ${keyName(UP[last])} up, A to ${keyName(DOWN[last])} down${more}</span>
+      <${Go} station=${station} kind="joints" go=${() => go("joints")}>Go<//></div>
+    <div class="joints" role="group" aria-label="Joints">
+      ${fields.map((field, k) => html`<div class="joint"><span class="name">${field.name}</span>
+        <${Jog} station=${station} what=${["joint", k, -1]} label=${`Joint ${k + 1} down`}>−<//>
+        <${Slider} station=${station} k=${k} field=${field} go=${() => go("joints")} />
+        <${Field} jog=${jog} kind="joints" k=${k} field=${field} label=${`Joint ${k + 1}`} go=${() => go("joints")}
+          title=${`${figure(field.low, 1)} to ${figure(field.high, 1)} ${field.sign}`} />
+        <${Jog} station=${station} what=${["joint", k, 1]} label=${`Joint ${k + 1} up`}>+<//></div>`)}
+    </div></section>`;
+}
+
+/** A joint between its limits: drawn to another value, it moves there when it's let go. */
+function Slider({ station, k, field: { name, low, high }, go }) {
+  const { jog } = station;
+  const typed = Number(jog.typed[name] ?? NaN);
+  const shown = useComputed(() => (jog.q ? jog.values("joints", jog.q)[k].toFixed(1) : low));
+  const why = station.idle;
+
+  function drop() {
+    go();
+    if (why) jog.type(name, undefined);
+  }
+
+  return html`<input class="slide" type="range" min=${low} max=${high} step="any" aria-label=${`Joint ${k + 1}, drawn`}
+    aria-disabled=${why ? "true" : undefined} title=${why || "Draw it to another value: the joint moves when you let go"}
+    value=${Number.isFinite(typed) ? typed : shown.value} onInput=${({ target }) => jog.type(name, Number(target.value).toFixed(1))}
+    onChange=${drop} onPointerUp=${letGo} />`;
+}
+
+function Tool({ station, go }) {
+  const { jog } = station;
+  const [motion, setMotion] = useState("line");
+  const fields = jog.fields("pose");
+  const goes = () => go("pose", motion);
+  const button = (k, sign, text) => {
+    const label = `${k < 3 ? `Tool along ${AXES[k]}` : `Tool: ${AXES[k]}`}, ${sign < 0 ? "minus" : "plus"}`;
+    return html`<${Jog} station=${station} what=${["tool", k, sign]} label=${label}>${text}<//>`;
+  };
+  const field = (k) => html`<${Field} jog=${jog} kind="pose" k=${k} field=${fields[k]} go=${goes}
+    label=${k < 3 ? `Tool's ${POSE[k]}` : `Tool's angle ${POSE[k]}`}
+    title=${k < 3 ? "Of the tool's point in the base frame" : `Turn of the tool, ${TURN}`} />`;
+  return html`<section>
+    <div class="head"><h2>Tool</h2>
+      <select id="jog-frame" aria-label="Frame of the tool's axes" value=${jog.frame} onChange=${({ target }) => (jog.frame = target.value)}>
+        <option value="base">base frame</option><option value="tool">tool frame</option></select>
+      <span class="grow"></span>
+      <select id="pose-motion" aria-label="How the tool goes to what is typed" value=${motion}
+        onChange=${({ target }) => setMotion(target.value)}>
+        <option value="line">in a line</option><option value="joint">by joints</option></select>
+      <${Go} station=${station} kind="pose" go=${goes}>Go<//></div>
+    <div class="axes" role="group" aria-label="Tool">
+      ${[0, 1, 2].map((k) => html`<div class="axis">
+        <span>${POSE[k]}</span>${button(k, -1, "−")}${field(k)}${button(k, 1, "+")}
+        <span>${AXES[k + 3]}</span>${button(k + 3, -1, "−")}${button(k + 3, 1, "+")}<span>${POSE[k + 3]}</span>${field(k + 3)}</div>`)}
+    </div></section>`;
+}
+
+function Poses({ station }) {
+  const { jog, session } = station;
+  const name = useRef(null);
+  const why = station.idle;
+  const pose = ([title, q]) => html`<button type="button" data-pose=${title} aria-disabled=${why ? "true" : undefined} title=${why || undefined}
+    onClick=${() => jog.go({ target: { type: "joints", q } }, title)}>${title}</button>`;
+
+  function save(event) {
+    event.preventDefault();
+    const wrong = jog.save(name.current.value.trim());
+    station.refuse(wrong);
+    if (!wrong) name.current.value = "";
+  }
+
+  return html`<section>
+    <div class="head"><h2>Go to</h2><span class="grow"></span><label for="when">Begin</label>
+      <select id="when" aria-label="When to begin" value=${jog.begin} onChange=${({ target }) => (jog.begin = target.value)}>
+        <option value="now">now</option><option value="append">after the plan</option><option value="later">in …</option></select>
+      <input id="later" type="number" min="0.5" max="600" step="0.5" value=${jog.later} hidden=${jog.begin !== "later"}
+        aria-label="Seconds from now" onInput=${({ target }) => (jog.later = target.value)} /></div>
+    <div class="goes"><div>
+      <div class="poses" role="group" aria-label="Named poses">${Object.entries(session.welcome.poses).map(pose)}
+        ${Object.entries(jog.saved).map(([title, q]) => html`<span class="saved">${pose([title, q])}
+          <button class="quiet" type="button" aria-label=${`Delete pose ${title}`} title="Delete it" onClick=${() => jog.remove(title)}>
+            <${Icon} name="delete" /></button></span>`)}</div>
+      <form class="row" onSubmit=${save}><input id="pose-name" ref=${name} maxlength="40" size="10" autocomplete="off"
+          aria-label="Name of a pose to save" placeholder="Name" title="Poses are kept in this browser" />
+        <button id="pose-save" title="Save the joints that are shown, in this browser">Save</button></form></div>
+      <div class="pad-row"><${Pad} station=${station} twist=${(parts) => jog.twist(parts)} why=${station.steer.idle} /></div></div></section>`;
 }

@@ -1,8 +1,9 @@
 // The 2D map: walls, both robots, what the laser sees, how sure the place is, the route; a click sends the robot there.
-import { DEGREES, h, write } from "./dom.js";
-import { needs } from "./handling.js";
+import { DEGREES, h, planted, write } from "./dom.js";
+import { Needs } from "./handling.js";
 import { FloorPlan } from "./plan.js";
 import { ask, goalText } from "./tasks.js";
+import { html } from "./ui.js";
 
 const PERIOD = 100;
 /** Words for how a journey is. */
@@ -31,7 +32,7 @@ export function mount(station, box) {
   const fault = h("p.refused", { id: "goal-fault" });
   const state = h("p.journey", { id: "journey", role: "status" });
   const doubt = h("p.muted", { id: "map-doubt" });
-  box.append(needs(station, box, "map-needs"), chart.element,
+  box.append(planted(html`<${Needs} station=${station} id="map-needs" />`), chart.element,
     h("p.hint", {}, "Click where the robot is to go; drag to say how it's to stand there. Escape takes it back."),
     state, places, form, fault, doubt);
 

@@ -1,8 +1,6 @@
 // The moves of a timeline, as people see them: a command's segments in a row.
 
-/** Holes of a move shorter than this are none [s]. */
-const SAME = 1e-6;
-/** Steering makes many short commands: those that follow each other so closely are one [s]. */
+/** Holes of a move shorter than this are none [s]: what steers goes on where an input was late. */
 const CLOSE = 0.05;
 
 /**
@@ -10,10 +8,10 @@ const CLOSE = 0.05;
  * @param {Timeline} timeline
  * @param {number} from [s]
  * @param {number} until [s]
- * @param {(id: number) => boolean} steers whether a command steered
- * @returns {{id: number, start: number, end: number, knots: number[], steers: boolean}[]}
+ * @param {(id: number, t: number) => ?object} nameOf what a command is called at a time: where that changes, a move ends
+ * @returns {{key: string, id: number, start: number, end: number, knots: number[], name: ?object}[]}
  */
-export function movesBetween(timeline, from, until, steers) {
+export function movesBetween(timeline, from, until, nameOf = () => null) {
   const moves = [];
   const { segments } = timeline;
   let index = Math.max(0, timeline.indexAt(from));
@@ -21,17 +19,14 @@ export function movesBetween(timeline, from, until, steers) {
   while (index > 0 && segments[index].commandId !== null && segments[index - 1].commandId === segments[index].commandId)
     index--;
   for (; index < segments.length && segments[index].start < until; index++) {
-    const { start, duration, commandId } = segments[index];
-    if (commandId === null || duration <= 0) continue;
-    const end = start + duration;
+    const { start, duration, commandId: id } = segments[index];
+    if (id === null || duration <= 0) continue;
+    const name = nameOf(id, start);
     const last = moves.at(-1);
-    const joins = last && start - last.end < SAME && last.id === commandId;
-    const goesOn = last && last.steers && start - last.end < CLOSE && steers(commandId);
-    if (joins || goesOn) {
+    if (last?.id === id && last.name === name && start - last.end < CLOSE) {
       last.knots.push(start);
-      last.end = end;
-      last.id = commandId;
-    } else moves.push({ id: commandId, start, end, knots: [], steers: steers(commandId) });
+      last.end = start + duration;
+    } else moves.push({ id, start, end: start + duration, knots: [], name });
   }
   return moves;
 }

@@ -38,7 +38,8 @@ export class Orders {
 
   put(entry, now) {
     entry.sentAt = now;
-    this.send({ type: "order", number: entry.number, epoch: entry.epoch, command: entry.command });
+    const { number, epoch, command, label } = entry;
+    this.send({ type: "order", number, epoch, command, label });
   }
 
   /** Take an outcome; the entry that it's of, or undefined. */

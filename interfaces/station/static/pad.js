@@ -1,5 +1,5 @@
 // The stick on the page, and a gamepad: both steer the tool, or a mobile robot.
-import { h, write } from "./dom.js";
+import { html, useEvery, useRef, useState } from "./ui.js";
 
 /** Deflections smaller than this are none. */
 const DEAD = 0.12;
@@ -17,75 +17,74 @@ function shaped(value) {
   return Math.sign(value) * size ** 1.5;
 }
 
+/** The gamepad as it is now: what was asked for before doesn't change in every browser. */
+function gamepad() {
+  return [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected);
+}
+
+/** What a gamepad asks for, as shares of a twist. */
+function partsOf(pad) {
+  if (!pad) return [0, 0, 0, 0, 0, 0];
+  const [x, y, turnX, turnY] = [0, 1, 2, 3].map((axis) => shaped(pad.axes[axis] ?? 0));
+  const lift = shaped((pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0));
+  return [-y, -x, lift, turnX, turnY, 0].map((part) => part || 0);
+}
+
 /**
  * @param {object} station
- * @param {Element} box
- * @param {object} steer takes inputs
- * @param {object} jog knows speed and frame
+ * @param {(parts: number[]) => object} twist the input that shares of the full speeds stand for
  * @param {{stick: string, gamepad: string}} words what they do
+ * @param {string} why the stick can't work now
  */
-export function mountPad(station, box, steer, jog, words = TOOL) {
-  const knob = h("i.knob");
-  const stick = h("div.stick", { role: "img", "aria-label": words.stick }, knob);
-  const found = h("p.hint.gamepad");
-  box.append(stick, found);
-  let lean = [0, 0];
+export function Pad({ station, twist, words = TOOL, why = "" }) {
+  const { steer, session } = station;
+  const [found, setFound] = useState(false);
+  const [stick, knob, lean] = [useRef(null), useRef(null), useRef([0, 0])];
+  /** What the gamepad does: whether it steers, and whether its B is down. */
+  const held = useRef({ steers: false, stops: false }).current;
 
   function set(x, y) {
-    lean = [x, y];
-    knob.style.transform = `translate(${x * RADIUS}px, ${y * RADIUS}px)`;
+    lean.current = [x, y];
+    knob.current.style.transform = `translate(${x * RADIUS}px, ${y * RADIUS}px)`;
   }
 
-  stick.addEventListener("pointerdown", (event) => {
-    stick.setPointerCapture(event.pointerId);
-    follow(event);
-    steer.hold("stick", () => jog.twist([-shaped(lean[1]), -shaped(lean[0]), 0, 0, 0, 0]), () => set(0, 0));
-  });
-  stick.addEventListener("pointermove", (event) => stick.hasPointerCapture(event.pointerId) && follow(event));
-  stick.addEventListener("lostpointercapture", () => {
-    set(0, 0);
-    steer.release("stick");
-  });
-
   function follow(event) {
-    const middle = stick.getBoundingClientRect();
-    const x = (event.clientX - middle.left - middle.width / 2) / RADIUS;
-    const y = (event.clientY - middle.top - middle.height / 2) / RADIUS;
+    if (!stick.current.hasPointerCapture(event.pointerId)) return;
+    const box = stick.current.getBoundingClientRect();
+    const x = (event.clientX - box.left - box.width / 2) / RADIUS;
+    const y = (event.clientY - box.top - box.height / 2) / RADIUS;
     const length = Math.max(1, Math.hypot(x, y));
     set(x / length, y / length);
   }
 
-  let [held, stopped] = [false, false];
-  setInterval(() => {
+  function grab(event) {
+    stick.current.setPointerCapture(event.pointerId);
+    follow(event);
+    const [x, y] = [0, 1];
+    steer.hold("stick", () => twist([-shaped(lean.current[y]), -shaped(lean.current[x]), 0, 0, 0, 0]), () => set(0, 0));
+  }
+
+  function drop() {
+    set(0, 0);
+    steer.release("stick");
+  }
+
+  useEvery(LOOK, () => {
     const pad = gamepad();
-    found.hidden = !pad;
-    write(found, pad ? words.gamepad : "");
-    if (!pad) {
-      if (held) steer.release("pad");
-      held = false;
-      return;
-    }
-    const pressed = pad.buttons[1]?.pressed === true;
-    if (pressed && !stopped) station.stop.press();
-    stopped = pressed;
-    const moves = twistOf(pad).some((part) => part !== 0);
-    if (moves && !held && station.session.holds) station.notices.use(null);
-    if (moves && !held && station.session.holds) held = steer.hold("pad", () => jog.twist(twistOf(gamepad())), () => (held = false));
-    else if (!moves && held) {
-      held = false;
+    if (Boolean(pad) !== found) setFound(Boolean(pad));
+    const stops = pad?.buttons[1]?.pressed === true;
+    if (stops && !held.stops) station.stop.press();
+    held.stops = stops;
+    const moves = partsOf(pad).some((part) => part !== 0);
+    if (moves && !held.steers && session.holds) {
+      station.notices.use(null);
+      held.steers = steer.hold("pad", () => twist(partsOf(gamepad())), () => (held.steers = false));
+    } else if (!moves && held.steers) {
+      held.steers = false;
       steer.release("pad");
     }
-  }, LOOK);
-
-  /** The gamepad as it is now: what was asked for before doesn't change in every browser. */
-  function gamepad() {
-    return [...(navigator.getGamepads?.() ?? [])].find((one) => one && one.connected);
-  }
-
-  function twistOf(pad) {
-    if (!pad) return [0, 0, 0, 0, 0, 0];
-    const [x, y, turnX, turnY] = [0, 1, 2, 3].map((axis) => shaped(pad.axes[axis] ?? 0));
-    const lift = shaped((pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0));
-    return [-y, -x, lift, turnX, turnY, 0].map((part) => part || 0);
-  }
+  });
+  return html`<div class="stick" role="img" ref=${stick} aria-label=${words.stick} title=${why || words.stick} data-off=${why ? "" : undefined}
+      onPointerDown=${grab} onPointerMove=${follow} onLostPointerCapture=${drop}><i class="knob" ref=${knob}></i></div>
+    <p class="hint gamepad" hidden=${!found}>${found ? words.gamepad : ""}</p>`;
 }

@@ -1,10 +1,9 @@
-// The 3D view: both robots, the committed path, what is shown and how far it can be trusted, and the past.
-import { clockText, h, write } from "./dom.js";
+// The 3D view of an arm: both robots, the committed path, what is shown and how far it can be trusted, and the past.
 import { History } from "./history.js";
 import { StationScene } from "./twins.js";
+import { clockText, html, untracked, useMemo, useOn, useRef, useSignalEffect } from "./ui.js";
 import { Viewport } from "./viewport.js";
 
-const PERIOD = 80;
 /** How long a change of the time that is looked at is spoken of [s]. */
 const CHANGED = 2.5;
 const BADGES = {
@@ -18,81 +17,58 @@ const LEGEND = [
   ["real", "Real", "solid, as measured"],
   ["committed", "Committed path", "where the real tool will go"],
 ];
+const PAST = ["history", "You look at another time; the robot goes on"];
 
-export function mount(station, box) {
-  const session = station.session;
-  const ahead = h("span.ahead", { "aria-hidden": "true" });
-  const viewport = new Viewport(station, box, LEGEND, StationScene, ahead);
-  const { pane, scene } = viewport;
-
-  const history = new History(station);
-  let changedAt = -Infinity;
-  let changedBy = null;
-  /** The time of the past that is shown [s]; null: now. */
-  let cursor = null;
-
-  const shared = (station.shared.pane = {
-    pane,
-    scene,
-    /** Joints of the virtual robot as the picture shows them; null where nothing is known. */
-    get shown() {
-      const t = cursor ?? session.now;
-      return t === null || !session.timeline ? null : session.timeline.joints(t);
-    },
-    get cursor() { return cursor; },
-    /** Show a time of the timeline [s]; null for now, and on with the time. */
-    show(t) {
-      if (scene && cursor === null && t !== null) scene.leave();
-      if (scene && cursor !== null && t === null) scene.resume();
-      cursor = t;
-      changedAt = -Infinity;
-      dress();
-      station.dispatchEvent(new CustomEvent("cursor", { detail: t }));
-      say();
-    },
-  });
+export function Panel({ station }) {
+  const { session, chain } = station;
+  const history = useMemo(() => new History(station), []);
+  const changed = useRef({ at: -Infinity, by: null }).current;
 
   /** Put both robots where they were. */
   function dress() {
-    const q = shared.shown;
-    if (!scene || cursor === null || !q) return;
+    const { cursor, scene, shown } = station;
+    if (!scene || cursor === null || !shown) return;
     const measured = history.at(cursor);
-    scene.pose("virtual", station.chain.links(q));
-    scene.pose("real", measured ? station.chain.links(measured) : null);
+    scene.pose("virtual", chain.links(shown));
+    scene.pose("real", measured && chain.links(measured));
   }
 
-  station.on("edit", ({ before, after, change }) => {
+  useSignalEffect(() => {
+    const { cursor, scene } = station;
+    if (cursor !== null) scene?.leave();
+    else scene?.resume();
+    changed.at = -Infinity;
     dress();
+    untracked(() => station.dispatchEvent(new CustomEvent("cursor", { detail: cursor })));
+  });
+  useOn(session, "edit", ({ before, after, change }) => {
+    dress();
+    const { cursor } = station;
     // Who looks at now sees each command at once: only who looks ahead had been shown something else.
     if (cursor === null || !before || !change || cursor <= Math.max(session.now ?? 0, change.segments.length ? change.start : change.end)) return;
     const [then, now] = [before.joints(cursor), after.joints(cursor)];
-    if (then.some((x, k) => Math.abs(x - now[k]) > 1e-9)) {
-      changedAt = performance.now() / 1000;
-      changedBy = change.command_id;
-    }
+    if (then.some((x, k) => Math.abs(x - now[k]) > 1e-9)) Object.assign(changed, { at: performance.now() / 1000, by: change.command_id });
   });
 
-  function standing() {
+  function trust() {
+    const { cursor } = station;
     if (!session.timeline || session.now === null) return "none";
     if (cursor !== null && cursor <= session.past) return "confirmed";
     if (session.link !== "live") return "none";
-    if (performance.now() / 1000 - changedAt < CHANGED) return "falsified";
-    return "predicted";
+    return performance.now() / 1000 - changed.at < CHANGED ? "falsified" : "predicted";
   }
 
-  function say() {
-    const status = standing();
-    const [symbol, word, meaning] = BADGES[status];
-    const by = status === "falsified" && changedBy !== null ? ` by #${changedBy}` : "";
-    viewport.stand(status, symbol, word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`));
-    viewport.badge.title = meaning;
-    const live = session.link === "live";
-    const left = live && cursor === null && scene ? scene.ahead : null;
-    write(ahead, left === null ? "" : `real robot at rest in ${left.toFixed(1)} s`);
-    viewport.cover(cursor === null ? null : ["history", "You look at another time; the robot goes on"]);
+  function standing() {
+    const { cursor, scene } = station;
+    const status = trust();
+    const [symbol, word, title] = BADGES[status];
+    const by = status === "falsified" && changed.by !== null ? ` by #${changed.by}` : "";
+    const left = session.link === "live" && cursor === null ? (scene?.ahead ?? null) : null;
+    return {
+      status, symbol, title, words: word + by + (cursor === null ? "" : ` · ${clockText(cursor)}`),
+      ahead: left === null ? "" : `real robot at rest in ${left.toFixed(1)} s`, across: cursor === null ? null : PAST,
+    };
   }
 
-  setInterval(say, PERIOD);
-  station.on("link", say);
-  say();
+  return html`<${Viewport} station=${station} Scene=${StationScene} legend=${LEGEND} standing=${standing} />`;
 }

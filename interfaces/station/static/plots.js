@@ -1,7 +1,7 @@
 // Plots of how far the robots are apart, why, and what the network does: of what is live here, and of recordings.
-import { ACROSS, Chart, due } from "./chart.js";
+import { Chart, due } from "./chart.js";
 import { armFigures, armGraphs, BASES, driveGraphs, DRIVE_FIGURES, rowsOf } from "./graphs.js";
-import { Happenings } from "./happenings.js";
+import { ACROSS } from "./happenings.js";
 import { DriveSamples, Samples } from "./samples.js";
 import { Table } from "./table.js";
 import { theme } from "./theme.js";
@@ -118,11 +118,10 @@ class LivePlots extends Plots {
     const arm = chain && { joints: chain.screws.length, slides: (joint) => chain.slides(joint) };
     super(drives ? driveGraphs(true) : armGraphs(arm, true), drives ? DRIVE_FIGURES : armFigures(arm), [samples], SPANS);
     Object.assign(this, { station, samples });
-    this.happenings = new Happenings(station);
     this.events = { key: "", found: [] };
     this.compared = -Infinity;
     this.comparing = this.number = 0;
-    station.addEventListener("cursor", () => this.again());
+    effect(() => this.again(station.cursor));
     setInterval(() => this.work(), TURN);
   }
 
@@ -131,11 +130,11 @@ class LivePlots extends Plots {
     const { now } = this.station.session;
     if (now === null) return null;
     const [span] = this.span;
-    const cursor = this.station.shared.pane?.cursor ?? null;
+    const { cursor } = this.station;
     const until = cursor === null ? now : Math.min(now, cursor + span / 2);
     // Lines across are the same for all plots of a turn or two.
     const key = `${Math.floor(until * 4)} ${span}`;
-    if (this.events.key !== key) this.events = { key, found: this.happenings.between(until - span, until) };
+    if (this.events.key !== key) this.events = { key, found: this.station.happenings.between(until - span, until) };
     return { samples: this.samples, from: until - span, until, cursor, now, basis: this.basis, events: this.events.found };
   }
 

@@ -1,46 +1,39 @@
 // What became of the commands that were given here, the newest first; a command's receipt changes with later ones.
-import { clockText, draw, h, icon, write } from "./dom.js";
+import { clockText, html, Icon, useOn, useRef, useState } from "./ui.js";
 
 const MOST = 60;
-const TONES = { accepted: "good", postponed: "warn", rejected: "bad", undone: "none", refused: "bad", pending: "none" };
-const SYMBOLS = {
-  accepted: "check_circle",
-  postponed: "schedule",
-  rejected: "block",
-  undone: "undo",
-  refused: "block",
-  pending: "more_horiz",
-  forgotten: "help",
+/** Steering inputs further apart than this are two rows [s]. */
+const APART = 1;
+/** What has come is drawn after so long [ms]. */
+const SOON = 100;
+/** Tone and symbol of how it stands. */
+const LOOKS = {
+  accepted: ["good", "check_circle"],
+  postponed: ["warn", "schedule"],
+  rejected: ["bad", "block"],
+  refused: ["bad", "block"],
+  undone: ["none", "undo"],
+  pending: ["none", "more_horiz"],
+  forgotten: ["none", "help"],
 };
+const WORDS = { cancel: "Delete", via: "By another place", stop: "STOP" };
 
 /** What a command is, for people. */
-export function describe({ command, label }) {
+function describe({ command, label }) {
   if (command === null) return "Undo";
-  switch (command.type) {
-    case "move":
-      return `Move to ${label || "a place"} at ${Math.round(100 * (command.speed ?? 1))} %`;
-    case "retime":
-      return `Begin at ${clockText(command.execute_at)}`;
-    case "cancel":
-      return "Delete";
-    case "via":
-      return "By another place";
-    case "scale":
-      return `Pace × ${command.factor}`;
-    case "stop":
-      return "STOP";
-    default:
-      return command.type[0].toUpperCase() + command.type.slice(1);
-  }
+  const { type } = command;
+  if (type === "move") return `Move to ${label || "a place"} at ${Math.round(100 * (command.speed ?? 1))} %`;
+  if (type === "retime") return `Begin at ${clockText(command.execute_at)}`;
+  if (type === "scale") return `Pace × ${command.factor}`;
+  return WORDS[type] ?? type[0].toUpperCase() + type.slice(1);
 }
 
 /** How it stands, in a word and a sentence. */
-export function standing(entry) {
-  const { outcome } = entry;
-  if (outcome === null) return [entry.forgotten ? "forgotten" : "pending", entry.forgotten ? "its fate isn't known" : ""];
+function standing({ command, outcome, forgotten }) {
+  if (outcome === null) return forgotten ? ["forgotten", "its fate isn't known"] : ["pending", ""];
   if (outcome.refusal) return ["refused", outcome.refusal];
-  const receipt = outcome.receipt;
-  if (!receipt) return ["accepted", entry.command === null ? "there was nothing to take back" : ""];
+  const { receipt } = outcome;
+  if (!receipt) return ["accepted", command === null ? "there was nothing to take back" : ""];
   if (receipt.undone) return ["undone", "taken back"];
   const said = receipt.reason ? [receipt.reason] : [];
   if (receipt.superseded_by) said.push(`cut short by #${receipt.superseded_by}`);
@@ -49,80 +42,55 @@ export function standing(entry) {
   return [receipt.status, said.join("; ")];
 }
 
-export function mount(station, box) {
-  const list = h("ol.receipts", { id: "receipts", "aria-label": "Commands given here, newest first" });
-  const empty = h("p.muted", {}, "What becomes of your commands is told here.");
-  box.append(empty, list);
-  const rows = new Map();
-  let steers = null;
+export function Panel({ station: { session } }) {
+  /** A row a command; steering is one for as long as it goes on: fifty inputs a second tell nothing one by one. */
+  const rows = useRef([]).current;
+  const timer = useRef(null);
+  const [, draw] = useState(0);
 
-  function row() {
-    const symbol = icon("more_horiz");
-    const [what, when, why] = [h("span.what"), h("span.when"), h("span.why")];
-    const element = h("li.receipt", {}, symbol, h("div", {}, h("div.line", {}, what, when), why));
-    list.prepend(element);
-    empty.hidden = true;
-    while (list.children.length > MOST) list.lastChild.remove();
-    return { element, symbol, what, when, why };
+  function changed() {
+    timer.current ??= setTimeout(() => {
+      timer.current = null;
+      draw((count) => count + 1);
+    }, SOON);
   }
 
-  function fill(parts, entry) {
-    const [status, why] = standing(entry);
-    const receipt = entry.outcome?.receipt;
-    parts.element.dataset.status = status;
-    parts.element.dataset.tone = TONES[status] ?? "none";
-    draw(parts.symbol, SYMBOLS[status] ?? "help");
-    const id = receipt?.command_id ?? entry.command?.command_id;
-    const number = id ? `#${id} ` : "";
-    write(parts.what, number + describe(entry));
-    const span = receipt?.execute_at != null ? `${clockText(receipt.execute_at)} – ${clockText(receipt.end)}` : "";
-    write(parts.when, span);
-    write(parts.why, status + (why ? ": " + why : ""));
-  }
-
-  /** Steering is one row for as long as it goes on: fifty inputs a second tell nothing one by one. */
-  function steered(entry) {
-    if (!steers || entry.at - steers.at > 1) {
-      const parts = row();
-      steers = { parts, at: entry.at, first: entry.at, count: 0, missed: 0 };
-      parts.element.dataset.tone = "good";
-      draw(parts.symbol, "open_with");
-      write(parts.what, "Steering");
-    }
-    steers.at = entry.at;
-    steers.count += 1;
-    write(steers.parts.when, `${(steers.at - steers.first).toFixed(1)} s`);
-    if (!steers.missed) write(steers.parts.why, `${steers.count} inputs`);
-    return steers;
-  }
-
-  station.on("order", (entry) => {
-    if (entry.command?.type === "steer") {
-      rows.set(entry, { steer: steered(entry) });
-    } else {
-      const parts = row();
-      rows.set(entry, parts);
-      fill(parts, entry);
-    }
-    if (rows.size > 400) rows.delete(rows.keys().next().value);
+  useOn(session, "order", (entry) => {
+    const steered = rows.find((row) => row.inputs);
+    if (entry.command?.type !== "steer") rows.unshift({ entry });
+    else if (steered && entry.at - steered.last <= APART) Object.assign(steered, { last: entry.at, inputs: steered.inputs + 1 });
+    else rows.unshift({ entry, last: entry.at, inputs: 1, missed: 0, why: "" });
+    rows.splice(MOST);
+    changed();
   });
-  station.on("outcome", (entry) => {
-    const parts = rows.get(entry);
-    if (!parts) return;
-    if (parts.steer) {
-      settle(parts.steer, entry);
-      return;
-    }
-    fill(parts, entry);
-  });
-
-  /** An input that wasn't taken is told of. */
-  function settle(row, entry) {
+  useOn(session, "outcome", (entry) => {
     const [status, why] = standing(entry);
-    if (status !== "refused" && status !== "rejected") return;
-    row.missed += 1;
-    row.parts.element.dataset.tone = "warn";
-    draw(row.parts.symbol, "warning");
-    write(row.parts.why, `${row.missed} of ${row.count} inputs not taken: ${why}`);
-  }
+    const steered = entry.command?.type === "steer" && rows.find((row) => row.inputs);
+    // An input that wasn't taken is told of.
+    if (steered && ["refused", "rejected"].includes(status)) Object.assign(steered, { missed: steered.missed + 1, why });
+    changed();
+  });
+  return html`<p class="muted" hidden=${rows.length > 0}>What becomes of your commands is told here.</p>
+    <ol class="receipts" id="receipts" aria-label="Commands given here, newest first">${rows.map((row) =>
+      html`<${row.inputs ? Steered : Command} key=${`${row.entry.epoch} ${row.entry.number}`} row=${row} />`)}</ol>`;
+}
+
+function Command({ row: { entry } }) {
+  const [status, why] = standing(entry);
+  const receipt = entry.outcome?.receipt;
+  const id = receipt?.command_id ?? entry.command?.command_id;
+  const span = receipt?.execute_at != null ? `${clockText(receipt.execute_at)} – ${clockText(receipt.end)}` : "";
+  return html`<${Receipt} status=${status} look=${LOOKS[status] ?? LOOKS.forgotten} what=${(id ? `#${id} ` : "") + describe(entry)}
+    when=${span} why=${status + (why ? ": " + why : "")} />`;
+}
+
+function Steered({ row: { entry, last, inputs, missed, why } }) {
+  const text = missed ? `${missed} of ${inputs} inputs not taken: ${why}` : `${inputs} inputs`;
+  return html`<${Receipt} look=${missed ? ["warn", "warning"] : ["good", "open_with"]} what="Steering"
+    when=${`${(last - entry.at).toFixed(1)} s`} why=${text} />`;
+}
+
+function Receipt({ status, look: [tone, symbol], what, when, why }) {
+  return html`<li class="receipt" data-status=${status} data-tone=${tone}><${Icon} name=${symbol} /><div>
+    <div class="line"><span class="what">${what}</span><span class="when">${when}</span></div><span class="why">${why}</span></div></li>`;
 }

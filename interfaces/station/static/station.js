@@ -1,9 +1,12 @@
 // The station: one session for the page, and the panels, each a component in its own place.
 import { Chain } from "./chain.js";
 import { DriveSession } from "./drivesession.js";
+import { Happenings } from "./happenings.js";
+import { Jogging } from "./jogging.js";
 import { App, Layout } from "./layout.js";
 import { Notice, Notices } from "./notice.js";
 import { Session } from "./session.js";
+import { Steer } from "./steer.js";
 import { Stop } from "./stop.js";
 import { html, observed, render } from "./ui.js";
 
@@ -22,11 +25,42 @@ class Station extends EventTarget {
     this.layout = new Layout(config.panels);
     /** What panels offer each other, by the panel's name. */
     this.shared = {};
-    observed(this, { polite: "", urgent: "" });
+    observed(this, {
+      // What is said to those who listen to the page.
+      polite: "",
+      urgent: "",
+      /** The time of the timeline that is looked at [s]; null: now. Setting it shows another one. */
+      cursor: null,
+      /** The 3D view, see twins.js; null before it's there, and where the browser draws none. */
+      scene: null,
+      /** VAL-II's terminal, once its panel is there. */
+      terminal: null,
+    });
     /** What couldn't be done, said at the control that was used. */
     this.notices = new Notices(this.session);
+    /** What is held by hand: `steer.hold(who, input)`. */
+    this.steer = new Steer(this);
+    /** How an arm is jogged. */
+    this.jog = this.drives ? null : new Jogging(this);
     /** STOP: `stop.press()`. */
     this.stop = new Stop(this);
+    /** What happened, for the strip and the plots. */
+    this.happenings = new Happenings(this);
+  }
+
+  /** Joints of the virtual robot as the picture shows them; null where nothing is known. */
+  get shown() {
+    const t = this.cursor ?? this.session.now;
+    return t === null || !this.session.timeline ? null : this.session.timeline.joints(t);
+  }
+
+  /** Why no orders can be given from here now; "" where they can. */
+  get idle() {
+    const { link, holds, lease, mayCommand } = this.session;
+    if (link !== "live") return "No connection.";
+    if (holds) return "";
+    if (!mayCommand) return "You are here to watch.";
+    return lease.state === "held" ? `${lease.holder} has control.` : "Take control first, in the bar above.";
   }
 
   /** Say something to those who listen to the page. */

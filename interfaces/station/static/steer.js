@@ -4,6 +4,19 @@
 const PERIOD = 40;
 /** By how much stamps lie behind this page's idea of the session's time, so that none comes before its time [s]. */
 const BEHIND = 0.004;
+const BLIND = "You look at another time: press Live to steer.";
+
+/** What the strip calls steering, by what is held; of the rest by what is asked for. */
+const BY = { drag: "tool dragged", stick: "tool by stick", pad: "tool by gamepad" };
+
+const AXES = ["tool x", "tool y", "tool z", "turn x", "turn y", "turn z"];
+
+/** What an input moves, in a word or two. */
+function steered({ rates, twist }) {
+  const asked = rates ?? twist ?? [];
+  const k = asked.findIndex((speed) => speed !== 0);
+  return k < 0 ? "" : `${rates ? `J${k + 1}` : AXES[k]} ${asked[k] < 0 ? "−" : "+"}`;
+}
 
 export class Steer {
   constructor(station) {
@@ -24,11 +37,12 @@ export class Steer {
 
   /** Whether the picture shows another time than now: nobody steers by that. */
   get blind() {
-    return (this.station.shared.pane?.cursor ?? null) !== null;
+    return this.station.cursor !== null;
   }
 
-  get active() {
-    return this.inputs.size > 0;
+  /** Why nobody can steer now; "" where somebody can. */
+  get idle() {
+    return this.station.idle || (this.blind ? BLIND : "");
   }
 
   /**
@@ -46,7 +60,7 @@ export class Steer {
       return false;
     }
     if (this.blind) {
-      this.station.refuse("you look at another time: press Live to steer");
+      this.station.refuse(BLIND);
       released();
       return false;
     }
@@ -63,7 +77,7 @@ export class Steer {
     if (!this.inputs.delete(who) || this.inputs.size) return;
     clearInterval(this.timer);
     this.timer = null;
-    if (!silently && this.last) this.give(stillAs(this.last));
+    if (!silently && this.last) this.give(stillAs(this.last), this.label);
   }
 
   releaseAll(how) {
@@ -76,18 +90,19 @@ export class Steer {
   send() {
     const [who, { input, released }] = [...this.inputs].at(-1);
     const wanted = input();
-    if (wanted !== null) this.give((this.last = wanted));
+    if (wanted !== null) this.give((this.last = wanted), BY[who] ?? steered(wanted));
     else {
       this.release(who);
       released();
     }
   }
 
-  give(wanted) {
+  give(wanted, label) {
+    this.label = label;
     const session = this.session;
     if (!session.holds || session.link !== "live" || session.orders.congested) return;
     const behind = Math.min(session.sync.uncertainty(performance.now() / 1000), 0.05) + BEHIND;
-    session.order({ type: "steer", ...wanted, issued_at: session.now - behind });
+    session.order({ type: "steer", ...wanted, issued_at: session.now - behind }, label);
   }
 }
 
@@ -95,12 +110,4 @@ export class Steer {
 function stillAs({ rates, twist, frame, ...other }) {
   if (other.type === "drive") return { ...other, v: 0, w: 0 };
   return rates ? { rates: rates.map(() => 0) } : { twist: twist.map(() => 0), frame };
-}
-
-let steer = null;
-
-/** The page's only one. */
-export function steering(station) {
-  steer ??= new Steer(station);
-  return steer;
 }

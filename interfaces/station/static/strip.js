@@ -1,204 +1,267 @@
 // The timeline as a strip: what was to the left, what is planned to the right, and what may be changed by hand.
-import { clockText, draw, h, icon, mark, write } from "./dom.js";
-import { Marks } from "./marks.js";
-import { MoveBars } from "./bars.js";
+import { Marks, Moves } from "./bars.js";
+import { movesBetween } from "./moves.js";
+import { Loader, planned, saveMoves } from "./planfile.js";
 import { View } from "./timeview.js";
+import { clockText, html, Icon, isTyping, observed, useComputed, useEffect, useMemo, useOn, useRef, useState } from "./ui.js";
 
 /** A step of the cursor by key [s]. */
 const STEP = 0.5;
 /** Between two drawings, unless something has changed [ms]: each takes the whole page's time without a graphics card. */
 const BETWEEN = window.VrsScene.software ? 120 : 16;
-const VIAS = [["up", "10 cm higher"], ["down", "10 cm lower"]];
+/** Moves that are drawn, at most. */
+const MOST = 300;
+/** How fast the past is played. */
+const RATES = [0.5, 1, 2];
+/** Key that plays and pauses, here as in replay: the space bar is STOP's. */
+const PLAY = "KeyK";
+/** A page that was held up for longer than this doesn't make up for it [s]. */
+const HELD_UP = 0.5;
 
-export function mount(station, box) {
-  const { session, shared, chain } = station;
-  const view = new View();
-  const slider = h("div.slider", { id: "slider", role: "slider", tabindex: 0, "aria-label": "Time that is shown",
-    "aria-valuemin": 0 });
-  const track = h("div.track", { id: "track", role: "group", "aria-label": "Timeline" });
-  const world = h("div.world");
-  const lines = { real: h("div.at.real"), now: h("div.at.now"), cursor: h("div.at.cursor", { hidden: true }) };
-  const ahead = h("div.committed");
-  const past = h("div.past");
-  track.append(past, slider, world, ...Object.values(lines));
-  world.append(ahead);
-  lines.now.append(h("span", {}, "now"));
-  lines.real.append(h("span", {}, "real"));
-
-  const live = button("live", "Live", "sensors", () => shared.pane.show(null), "Show what is now");
-  const undo = button("undo", "Undo", "undo", () => session.order(null), "Take back the newest command");
-  const drop = button("delete", "Delete", "delete", () => remove(bars.selected), "Take the chosen move out of the plan");
-  const via = button("via", "Via", "alt_route", () => goBy(bars.selected), "Let the chosen move go by another place");
-  const place = h("select", { id: "via-place", "aria-label": "Where a via is" },
-    ...VIAS.map(([value, text]) => h("option", { value }, text)));
-  const less = button("zoom-out", "", "remove", () => zoom(1), "Show more time");
-  const more = button("zoom-in", "", "add", () => zoom(-1), "Show less time");
-  const span = h("span.muted");
-  const readout = h("span.readout", { id: "time" });
-  box.append(
-    h("div.tools", {}, readout, live, h("span.gap"), undo, drop, via, place, h("span.grow"),
-      h("span.muted.wide", {}, "Drag a scheduled move, or the strip to look back"), less, span, more),
-    track,
-  );
-
-  const bars = new MoveBars(station, world, view, { retime, remove, chosen });
-  const marks = new Marks(station, world, view);
-  let stale = true;
-  let drawnAt = -Infinity;
-  let listed = false;
-
-  function button(id, text, symbol, action, title) {
-    const does = () => (made.dataset.bar ? station.refuse(made.dataset.bar) : action());
-    const made = h("button.tool", { type: "button", id, title, "aria-label": text ? null : title, onclick: does },
-      icon(symbol), text || null);
-    return made;
+/** What the strip shows, and what is done from it. */
+class Strip {
+  constructor(station) {
+    [this.station, this.session] = [station, station.session];
+    this.view = new View();
+    observed(this, {
+      /** The move that was chosen, by its command; it stays that whatever becomes of the plan. */
+      chosen: null,
+      /** What is drawn, see moves.js: anew when the plan or the window changes. */
+      moves: [],
+      /** Whether the time that is looked at goes on, and how fast. */
+      plays: false,
+      rate: 1,
+      seconds: this.view.seconds,
+    });
+    this.stale = true;
+    this.drawnAt = -Infinity;
+    /** When the next of the moves begins or ends [s]. */
+    this.due = Infinity;
   }
 
-  /** Let a button do nothing now but say why; "" where it works. */
-  function bar(made, why) {
-    mark(made, "data-bar", why || null);
-    mark(made, "aria-disabled", why ? "true" : null);
+  /** The chosen move, wherever it stands in the plan; undefined where it's in it no more. */
+  get move() {
+    if (this.chosen === null) return undefined;
+    const parts = this.session.timeline?.segments.filter(({ commandId }) => commandId === this.chosen) ?? [];
+    const last = parts.at(-1);
+    return last ? { id: this.chosen, start: parts[0].start, end: last.start + last.duration } : undefined;
   }
 
-  function zoom(way) {
-    view.zoom(way, session.now ?? 0);
-    stale = true;
+  /** Why nothing can be commanded from here now; "" where it can. */
+  get idle() {
+    if (this.session.link !== "live") return "there's no connection";
+    return this.session.holds ? "" : "take control first";
   }
 
-  function retime(id, start) {
-    return session.order({ type: "retime", command_id: id, execute_at: start });
+  retime(id, start) {
+    return this.session.order({ type: "retime", command_id: id, execute_at: start });
   }
 
-  function remove(id) {
-    if (id !== null) session.order({ type: "cancel", command_id: id });
+  remove(id) {
+    this.session.order({ type: "cancel", command_id: id });
   }
 
-  /** Let a move go by a place: a named pose, or over the middle of its way. */
-  function goBy(id) {
-    const bar = bars.move(id);
-    if (!bar) return;
-    const named = session.welcome.poses[place.value];
-    const command = { type: "via", command_id: id, deviation: 0.05 };
-    if (named) command.target = { type: "joints", q: named };
+  /** Let the chosen move go by a place: a named pose, or over the middle of its way. */
+  goBy(place) {
+    const { session, station, move } = this;
+    const q = session.welcome.poses[place];
+    const command = { type: "via", command_id: move.id, deviation: 0.05 };
+    if (q) command.target = { type: "joints", q };
     else {
-      const X = chain.links(session.timeline.joints((bar.start + bar.end) / 2)).at(-1);
+      const X = station.chain.links(session.timeline.joints((move.start + move.end) / 2)).at(-1);
       const rows = [0, 1, 2, 3].map((row) => [0, 1, 2, 3].map((column) => X[row + 4 * column]));
-      rows[2][3] += place.value === "up" ? 0.1 : -0.1;
+      rows[2][3] += place === "up" ? 0.1 : -0.1;
       command.target = { type: "pose", X: rows };
     }
     session.order(command);
   }
 
-  function chosen(id) {
-    const idle = session.link !== "live" ? "there's no connection" : session.holds ? "" : "take control first";
-    const move = id === null ? null : bars.move(id);
-    const none = move ? "this move is over" : "choose a move on the strip first";
-    const why = idle || (move?.end > (session.now ?? 0) ? "" : none);
-    bar(undo, idle);
-    for (const made of [drop, via]) bar(made, why);
-    place.disabled = why !== "";
+  zoom(way) {
+    this.view.zoom(way, this.session.now ?? 0);
+    this.seconds = this.view.seconds;
+    this.stale = true;
   }
 
-  /** The time under a pointer becomes what is shown. */
+  /** Look at a time of the timeline. */
+  look(t) {
+    const { timeline, now } = this.session;
+    this.view.follows = false;
+    this.station.cursor = Math.max(timeline.start, Math.min(t, Math.max(timeline.end, now)));
+  }
+
+  /** Show what is now, and go on with it. */
+  live() {
+    this.plays = false;
+    this.view.follows = true;
+    this.station.cursor = null;
+  }
+
+  /** Let the time that is looked at go on by a while [s]: up to now, or to the end of what is planned. */
+  play(dt) {
+    const { station: { cursor }, session: { now, timeline }, view } = this;
+    if (cursor === null) this.live();
+    if (!this.plays) return;
+    const t = cursor + this.rate * Math.min(dt, HELD_UP);
+    if (cursor <= now && t > now) this.live();
+    else {
+      this.plays = t < timeline.end || t < now;
+      this.look(t);
+      view.reveal(t);
+    }
+  }
+
+  /** Go on with the time; whether something is to be put in its place. */
+  advance(at, width) {
+    const { session, view } = this;
+    const { now, timeline } = session;
+    if (now === null || !timeline || document.hidden || (at - this.drawnAt < BETWEEN && !this.stale)) return false;
+    this.play((at - this.drawnAt) / 1000);
+    this.drawnAt = at;
+    if (view.advance(now, width) || this.stale || now >= this.due) this.draw(timeline, now);
+    return true;
+  }
+
+  draw(timeline, now) {
+    this.stale = false;
+    const [from, until] = this.view.drawn;
+    this.moves = movesBetween(timeline, from, until, (id, t) => this.session.reader.nameOf(id, t)).slice(-MOST);
+    this.due = Math.min(...this.moves.flatMap(({ start, end }) => [start, end]).filter((t) => t > now));
+  }
+}
+
+export function Panel({ station }) {
+  const strip = useMemo(() => new Strip(station), []);
+  useOn(station.session, "edit", () => (strip.stale = true));
+  useEffect(() => {
+    function key(event) {
+      if (event.code !== PLAY || station.cursor === null || event.ctrlKey || event.altKey || event.metaKey || isTyping(event)) return;
+      event.stopImmediatePropagation();
+      event.preventDefault();
+      if (!event.repeat) strip.plays = !strip.plays;
+    }
+
+    window.addEventListener("keydown", key, { capture: true });
+    return () => window.removeEventListener("keydown", key, { capture: true });
+  }, []);
+  return html`<div class="tools"><${Tools} strip=${strip} /></div><${Track} strip=${strip} />`;
+}
+
+/** A button that does something, or says why it can't now. */
+function Tool({ station, id, icon, title, why = "", does, children, ...others }) {
+  return html`<button class="tool" type="button" id=${id} title=${title} aria-label=${children ?? title} aria-disabled=${why ? "true" : null}
+    onClick=${() => (why ? station.refuse(why) : does())} ...${others}><${Icon} name=${icon} />${children && html`<span>${children}</span>`}</button>`;
+}
+
+function Tools({ strip }) {
+  const { station, session, idle, chosen, moves, plays } = strip;
+  const [place, setPlace] = useState("up");
+  const old = session.link !== "live";
+  // It's drawn anew where it begins and ends, not for each time between.
+  const past = useComputed(() => station.cursor !== null).value;
+  const over = moves && chosen !== null && !(strip.move?.end > (session.now ?? 0));
+  const why = idle || (chosen === null ? "choose a move on the strip first" : over ? "this move is over" : "");
+  const poses = Object.keys(session.welcome?.poses ?? {});
+  const tool = (id, icon, title, does, children, others) =>
+    html`<${Tool} station=${station} id=${id} icon=${icon} title=${title} does=${does} ...${others}>${children}<//>`;
+  return html`<span class="readout" id="time"></span>
+    ${tool("live", old ? "sensors_off" : "sensors", old ? "What you see is old" : "Show what is now", () => strip.live(), "Live",
+      { "aria-pressed": String(!past && !old), "data-off": past ? "" : null, "data-old": old ? "" : null })}
+    ${tool("play", plays ? "pause" : "play_arrow", plays ? "Pause (K)" : "Play what is looked at (K)", () => (strip.plays = !plays), null,
+      { why: past ? "" : "look back first: drag the strip", "aria-label": plays ? "Pause" : "Play" })}
+    <select id="rate" aria-label="How fast it plays" value=${strip.rate} onChange=${(event) => (strip.rate = Number(event.target.value))}>
+      ${RATES.map((rate) => html`<option value=${rate}>×${rate}</option>`)}</select>
+    <span class="gap"></span>
+    ${tool("undo", "undo", "Take back the newest command", () => session.order(null), "Undo", { why: idle })}
+    ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
+    ${tool("delete", "delete", "Take the chosen move out of the plan", () => strip.remove(chosen), "Delete", { why })}
+    ${tool("via", "alt_route", "Let the chosen move go by another place", () => strip.goBy(place), "Via", { why })}
+    <select id="via-place" aria-label="Where a via is" disabled=${why !== ""} value=${place} onChange=${(event) => setPlace(event.target.value)}>
+      <option value="up">10 cm higher</option><option value="down">10 cm lower</option>
+      ${poses.map((pose) => html`<option value=${pose}>by ${pose}</option>`)}</select>
+    <span class="gap"></span>
+    ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
+      { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
+    <${Loader} strip=${strip} tool=${tool} />
+    <span class="grow"></span>
+    <span class="muted wide">Drag a scheduled move, or the strip to look back</span>
+    ${tool("zoom-out", "remove", "Show more time", () => strip.zoom(1))}
+    <span class="muted">${strip.seconds} s</span>
+    ${tool("zoom-in", "add", "Show less time", () => strip.zoom(-1))}`;
+}
+
+/** The strip itself. Its lines are put in their places by hand, as often as the screen is drawn. */
+function Track({ strip }) {
+  const { station, session, view } = strip;
+  const track = useRef(null);
+  const [slider, world, past, ahead, real, now, cursor] = [0, 0, 0, 0, 0, 0, 0].map(() => useRef(null));
+
+  useEffect(() => {
+    let frame = requestAnimationFrame(function next(at) {
+      frame = requestAnimationFrame(next);
+      if (strip.advance(at, track.current.clientWidth)) place();
+    });
+    return () => cancelAnimationFrame(frame);
+  }, []);
+
+  function place() {
+    const { now: t, timeline: { end }, state } = session;
+    const at = (line, time) => (line.current.style.transform = `translateX(${view.x(time).toFixed(1)}px)`);
+    const playing = state === null ? t : t + state.D;
+    world.current.style.transform = `translateX(${view.shift.toFixed(1)}px)`;
+    at(now, t);
+    at(real, playing);
+    set(ahead.current, "hidden", end <= playing);
+    ahead.current.style.left = `${view.left(playing).toFixed(1)}px`;
+    ahead.current.style.width = `${Math.max(0, view.left(end) - view.left(playing)).toFixed(1)}px`;
+    past.current.style.width = `${Math.max(0, Math.min(view.width, view.x(t))).toFixed(1)}px`;
+    const { cursor: looked } = station;
+    set(cursor.current, "hidden", looked === null);
+    if (looked !== null) at(cursor, looked);
+    const shown = looked ?? t;
+    set(document.getElementById("time"), "textContent", clockText(shown));
+    set(slider.current, "ariaValueMax", String(Math.round(Math.max(end, t))));
+    set(slider.current, "ariaValueNow", String(Math.round(shown)));
+    set(slider.current, "ariaValueText", looked === null ? "live" : clockText(shown));
+  }
+
+  const known = () => session.timeline && session.now !== null;
+
   function scrub(event) {
-    const t = view.timeAt(event.clientX - track.getBoundingClientRect().left);
-    const { start, end } = session.timeline;
-    shared.pane.show(Math.max(start, Math.min(t, Math.max(end, session.now))));
+    strip.plays = false;
+    strip.look(view.timeAt(event.clientX - track.current.getBoundingClientRect().left));
   }
 
-  track.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0 || !session.timeline || session.now === null || event.target.closest(".move")) return;
-    track.setPointerCapture(event.pointerId);
-    view.freeze();
+  function press(event) {
+    if (event.button !== 0 || !known() || event.target.closest(".move")) return;
+    track.current.setPointerCapture(event.pointerId);
     scrub(event);
-  });
-  track.addEventListener("pointermove", (event) => track.hasPointerCapture(event.pointerId) && scrub(event));
-  track.addEventListener("wheel", (event) => {
+  }
+
+  function turn(event) {
     event.preventDefault();
-    zoom(Math.sign(event.deltaY));
-  });
-  slider.addEventListener("keydown", (event) => {
-    if (!session.timeline || session.now === null) return;
+    strip.zoom(Math.sign(event.deltaY));
+  }
+
+  function key(event) {
     const way = { ArrowLeft: -STEP, ArrowRight: STEP, PageUp: -10 * STEP, PageDown: 10 * STEP }[event.key];
-    if (event.key === "Escape" || event.key === "End") shared.pane.show(null);
-    else if (way !== undefined) {
-      view.freeze();
-      const t = (shared.pane.cursor ?? session.now) + way;
-      shared.pane.show(Math.max(session.timeline.start, Math.min(t, Math.max(session.timeline.end, session.now))));
-    } else return;
+    if (!known()) return;
+    if (event.key === "Escape" || event.key === "End") strip.live();
+    else if (way !== undefined) strip.look((station.cursor ?? session.now) + way);
+    else return;
     event.preventDefault();
     event.stopPropagation();
-  });
-
-  station.addEventListener("cursor", ({ detail: t }) => {
-    if (t === null) view.follow();
-    lines.cursor.hidden = t === null;
-    mark(live, "data-off", t === null ? null : "");
-    follows();
-  });
-  station.on("link", follows);
-  for (const type of ["edit", "lease", "link"]) {
-    station.on(type, () => {
-      stale = true;
-    });
-  }
-  station.on("welcome", name);
-
-  /** Whether the picture shows what is now: not while it's old. */
-  function follows() {
-    const old = session.link !== "live";
-    mark(live, "aria-pressed", String((shared.pane.cursor ?? null) === null && !old));
-    mark(live, "data-old", old ? "" : null);
-    draw(live.firstChild, old ? "sensors_off" : "sensors");
-    mark(live, "title", old ? "What you see is old" : "Show what is now");
   }
 
-  /** Named poses may be vias too. */
-  function name() {
-    if (listed || !session.welcome) return;
-    listed = true;
-    for (const pose of Object.keys(session.welcome.poses)) place.append(h("option", { value: pose }, "by " + pose));
-  }
+  return html`<div class="track" id="track" role="group" aria-label="Timeline" ref=${track} onWheel=${turn} onPointerDown=${press}
+    onPointerMove=${(event) => track.current.hasPointerCapture(event.pointerId) && scrub(event)}>
+    <div class="past" ref=${past}></div>
+    <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0" ref=${slider} onKeyDown=${key}></div>
+    <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Moves} strip=${strip} /></div>
+    <div class="at real" ref=${real}><span>real</span></div><div class="at now" ref=${now}><span>now</span></div>
+    <div class="at cursor" hidden ref=${cursor}></div></div>`;
+}
 
-  function frame(at) {
-    requestAnimationFrame(frame);
-    const now = session.now;
-    if (now === null || !session.timeline || document.hidden || (at - drawnAt < BETWEEN && !stale)) return;
-    drawnAt = at;
-    const width = track.clientWidth;
-    const moved = view.advance(now, width);
-    if (stale || moved) {
-      stale = false;
-      bars.draw(session.timeline, now);
-      marks.draw();
-    }
-    chosen(bars.selected);
-    bars.tell(now);
-    world.style.transform = `translateX(${view.shift().toFixed(1)}px)`;
-    put(lines.now, view.x(now));
-    const real = session.state === null ? now : now + session.state.D;
-    put(lines.real, view.x(real));
-    const end = session.timeline.end;
-    ahead.hidden = end <= real;
-    ahead.style.left = `${view.left(real).toFixed(1)}px`;
-    ahead.style.width = `${(view.left(end) - view.left(real)).toFixed(1)}px`;
-    past.style.width = `${Math.max(0, Math.min(width, view.x(now))).toFixed(1)}px`;
-    const cursor = shared.pane.cursor;
-    if (cursor !== null) put(lines.cursor, view.x(cursor));
-    const shown = cursor ?? now;
-    write(readout, clockText(shown));
-    write(span, `${view.seconds} s`);
-    mark(slider, "aria-valuemax", Math.round(Math.max(end, now)));
-    mark(slider, "aria-valuenow", Math.round(shown));
-    mark(slider, "aria-valuetext", cursor === null ? "live" : clockText(shown));
-  }
-
-  function put(line, x) {
-    line.style.transform = `translateX(${x.toFixed(1)}px)`;
-  }
-
-  follows();
-  name();
-  chosen(null);
-  requestAnimationFrame(frame);
+/** Set what an element is or says, but touch nothing if it's so already. */
+function set(element, name, value) {
+  if (element[name] !== value) element[name] = value;
 }

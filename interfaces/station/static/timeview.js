@@ -4,6 +4,8 @@
 const SPANS = [5, 10, 20, 30, 60, 120, 300, 600];
 /** Where now stands while the strip goes with the time, as a share of the width. */
 const NOW = 0.4;
+/** What plays is kept left of this share of the width. */
+const RIGHTMOST = 0.85;
 /** The drawn part reaches so many widths to either side. */
 const BESIDE = 1;
 
@@ -11,7 +13,7 @@ export class View {
   constructor() {
     this.choice = 3;
     this.width = 1;
-    /** Time at the left edge [s]. */
+    /** Time at the left edge [s]; and whether it goes with the time. */
     this.begin = 0;
     this.follows = true;
     /** Time at which drawn things have 0 [s], and how far they reach. */
@@ -26,15 +28,6 @@ export class View {
   /** Pixels a second. */
   get scale() {
     return this.width / this.seconds;
-  }
-
-  /** Go with the time, or stay. */
-  follow() {
-    this.follows = true;
-  }
-
-  freeze() {
-    this.follows = false;
   }
 
   /** Show more time (1) or less (−1), with a time where it is. */
@@ -57,7 +50,12 @@ export class View {
     return true;
   }
 
-  /** Where a time is in the strip [px]. */
+  /** Let a time be seen: it's drawn no further to the right than this. */
+  reveal(t) {
+    this.begin = Math.max(this.begin, t - RIGHTMOST * this.seconds);
+  }
+
+  /** Where a time is in the strip [px], and the time of a place. */
   x(t) {
     return (t - this.begin) * this.scale;
   }
@@ -71,7 +69,7 @@ export class View {
     return (t - this.origin) * this.scale;
   }
 
-  shift() {
+  get shift() {
     return (this.origin - this.begin) * this.scale;
   }
 }

@@ -40,6 +40,7 @@ export class StationScene extends window.VrsScene {
 
   /** Show another time from now on: `pose` places the robots. */
   leave() {
+    if (this.kept !== null) return;
     this.kept = new Map();
     for (const twin of ["virtual", "real"]) {
       const body = this.viewer.scene_tree.find([ROOT, twin, "body"]);
@@ -59,6 +60,7 @@ export class StationScene extends window.VrsScene {
 
   /** Show what is now. */
   resume() {
+    if (this.kept === null) return;
     const kept = this.kept;
     this.kept = null;
     for (const command of kept.values()) this.handle(command);

@@ -1,96 +1,72 @@
-// What the 3D views of all robots share: the pane with its scene, a legend that hides parts, a badge, and words across.
-import { draw, h, icon, mark, write } from "./dom.js";
+// What the 3D views of all robots share: the picture, a legend that hides parts, a badge, and words across.
 import { theme } from "./theme.js";
-import { effect } from "./ui.js";
+import { effect, html, Icon, useEffect, useLayoutEffect, useRef, useState } from "./ui.js";
 
 const OLD = {
   stale: ["hourglass_empty", "Stale: what you see is old"],
   lost: ["wifi_off", "Lost: what you see is old. Trying again"],
 };
-
 /** So long a robot may wait before it's told why [ms]: for who takes control it goes on by itself. */
 const PATIENCE = 1200;
+/** Between two looks at what changes with the time [ms]. */
+const PERIOD = 80;
 
-export class Viewport {
-  /**
-   * @param {object} station
-   * @param {Element} box where it goes
-   * @param {Array<[string, string, string]>} legend what is drawn: its path in the scene, its name, and what it stands for
-   * @param {Function} Scene a StationScene
-   * @param {...Element} beside what stands beside the badge
-   */
-  constructor(station, box, legend, Scene, ...beside) {
-    [this.session, this.box] = [station.session, box];
-    this.pane = h("div.pane", { id: "pane", role: "img", "aria-label": "Both robots in 3D" });
-    const labels = h("div.labels", { "aria-hidden": "true" });
-    this.symbol = icon("help");
-    this.words = h("span");
-    this.badge = h("span.badge", { id: "badge", role: "status" }, this.symbol, this.words);
-    this.banner = h("div.banner", { id: "banner", hidden: true });
-    this.across = "";
-    /** Since when the real robot has been waiting for who has control [ms]; null while it isn't. */
-    this.waiting = null;
-    const entries = h("ul.legend");
-    const home = h("button.quiet", { type: "button", id: "home", title: "Reset the view", "aria-label": "Reset the view" },
-      icon("center_focus_strong"));
-    box.append(this.pane, labels, entries, h("div.corner", {}, this.badge, ...beside), home, this.banner);
-
-    /** Null where the browser draws nothing in 3D. */
-    this.scene = null;
-    for (const [name, title, note] of legend) {
-      const button = h("button", { type: "button", "aria-pressed": "true", title: note, "data-path": name },
-        h("i.key.key-" + name), title);
-      button.addEventListener("click", () => this.scene && mark(button, "aria-pressed", String(this.scene.toggle(name))));
-      entries.append(h("li", {}, button));
-    }
-    home.addEventListener("click", () => this.scene?.home());
+/**
+ * @param {Function} Scene a StationScene
+ * @param {Array<[string, string, string]>} legend what is drawn: its path in the scene, its name, and what it stands for
+ * @param {() => object} standing says how the picture stands: {status, symbol, words, title, ahead, across}
+ */
+export function Viewport({ station, Scene, legend, standing }) {
+  const [pane, labels] = [useRef(null), useRef(null)];
+  const [flat, setFlat] = useState(false);
+  useLayoutEffect(() => {
     try {
-      this.scene = new Scene(this.pane, labels, () => {});
+      station.scene = new Scene(pane.current, labels.current);
     } catch {
-      this.pane.replaceChildren(h("p.no-3d", {}, "No 3D view: this browser offers no WebGL."));
-      entries.hidden = home.hidden = true;
+      pane.current.replaceChildren();
+      setFlat(true);
+      return undefined;
     }
-    if (this.scene) this.connect(station, this.scene);
-  }
+    const { scene } = station;
+    const link = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], { take: (data) => scene.take(data), state: () => {} });
+    station.addEventListener("unlocked", () => link.connect());
+    link.connect();
+    return effect(() => scene.paint(theme() === "dark"));
+  }, []);
+  return html`<div class="view" data-link=${station.session.link}>
+    <div class="pane" id="pane" role="img" aria-label="Both robots in 3D" ref=${pane}>
+      ${flat && html`<p class="no-3d">No 3D view: this browser offers no WebGL.</p>`}</div>
+    <div class="labels" aria-hidden="true" ref=${labels}></div>
+    <ul class="legend" hidden=${flat}>${legend.map((entry) => html`<${Entry} station=${station} entry=${entry} />`)}</ul>
+    <button class="quiet" type="button" id="home" title="Reset the view" aria-label="Reset the view" hidden=${flat}
+      onClick=${() => station.scene?.home()}><${Icon} name="center_focus_strong" /></button>
+    <${Standing} session=${station.session} standing=${standing} /></div>`;
+}
 
-  connect(station, scene) {
-    const connection = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], {
-      take: (data) => scene.take(data),
-      state: () => {},
-    });
-    effect(() => scene.paint(theme() === "dark"));
-    station.addEventListener("unlocked", () => connection.connect());
-    connection.connect();
-  }
+function Entry({ station, entry: [path, name, note] }) {
+  const [shown, setShown] = useState(true);
+  return html`<li><button type="button" aria-pressed=${String(shown)} title=${note} data-path=${path}
+    onClick=${() => station.scene && setShown(station.scene.toggle(path))}><i class=${"key key-" + path}></i>${name}</button></li>`;
+}
 
-  /** Why the real robot has been waiting for some time for who has control, [symbol, words]; null where it hasn't. */
-  waits() {
-    const { state, holds } = this.session;
-    const now = performance.now();
-    if (!state?.halted || !holds) this.waiting = null;
-    else this.waiting ??= now;
-    if (this.waiting === null || now - this.waiting < PATIENCE) return null;
-    return ["pause_circle", `Real robot waits: ${state.halted}. Resume lets it go on.`];
-  }
-
-  /** Say how the picture stands. */
-  stand(status, symbol, words) {
-    mark(this.badge, "data-status", status);
-    draw(this.symbol, symbol);
-    write(this.words, words);
-  }
-
-  /** Lay words across: that what one sees is old, else others, [symbol, words], else why the real robot waits. */
-  cover(otherwise = null) {
-    const { link } = this.session;
-    const old = OLD[link];
-    const waits = this.waits();
-    const shown = old ?? otherwise ?? waits;
-    mark(this.box, "data-link", link);
-    mark(this.banner, "data-kind", old ? link : otherwise ? "past" : "halted");
-    this.banner.hidden = !shown;
-    if (!shown || shown[1] === this.across) return;
-    this.across = shown[1];
-    this.banner.replaceChildren(icon(shown[0]), h("span", {}, shown[1]));
-  }
+/** How the picture stands: a badge, how far the real robot is behind, and words across where something is in the way. */
+function Standing({ session, standing }) {
+  const [, look] = useState(0);
+  useEffect(() => {
+    const timer = setInterval(() => look((count) => count + 1), PERIOD);
+    return () => clearInterval(timer);
+  }, []);
+  const { status, symbol, words, title, ahead, across } = standing();
+  const { link, state, holds } = session;
+  const waiting = useRef(null);
+  if (!state?.halted || !holds) waiting.current = null;
+  else waiting.current ??= performance.now();
+  const waits = waiting.current !== null && performance.now() - waiting.current >= PATIENCE;
+  const why = waits ? ["pause_circle", `Real robot waits: ${state.halted}. Resume lets it go on.`] : null;
+  const [mark, text] = OLD[link] ?? across ?? why ?? [];
+  return html`<div class="corner">
+      <span class="badge" id="badge" role="status" data-status=${status} title=${title}><${Icon} name=${symbol} /><span>${words}</span></span>
+      <span class="ahead" aria-hidden="true">${ahead}</span></div>
+    <div class="banner" id="banner" hidden=${!text} data-kind=${OLD[link] ? link : across ? "past" : "halted"}>
+      ${text && html`<${Icon} name=${mark} /><span>${text}</span>`}</div>`;
 }

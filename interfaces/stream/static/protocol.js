@@ -71,6 +71,8 @@ function map(x, where, check) {
 const STATUS = new Set(["accepted", "postponed", "rejected"]);
 const REFUSAL_CODE = new Set(["other", "overruled", "not-following"]);
 const FRAME_STATUS = new Set(["predicted", "confirmed", "falsified"]);
+const MOTION = new Set(["joint", "line"]);
+const PROFILE = new Set(["parabolic", "jerk-limited"]);
 const PROBLEM_CODE = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
 const LEASE_STATE = new Set(["free", "held", "ending"]);
 const LEASE_END = new Set(["released", "expired", "taken over"]);
@@ -154,6 +156,19 @@ function checkCompact(m) {
   return m;
 }
 
+/** What a command is, and what people call it; of several of one command each counts from its time on. */
+function checkCommandName(m) {
+  map(m, "CommandName");
+  whole(m.command_id, -WHOLE, WHOLE, "CommandName.command_id");
+  real(m.t, -1e9, 1e9, "CommandName.t"); // From this session time on [s]: steering goes one way, then another.
+  text(m.kind, 0, 200, "CommandName.kind"); // Type of the command.
+  m.label = m.label === undefined ? "" : text(m.label, 0, 60, "CommandName.label"); // As the order said.
+  m.speed = m.speed === undefined ? 1.0 : real(m.speed, 0, 1, "CommandName.speed"); // Of a move, as it was commanded; so are motion and profile.
+  m.motion = m.motion === undefined ? "joint" : word(m.motion, MOTION, "CommandName.motion");
+  m.profile = m.profile === undefined ? "parabolic" : word(m.profile, PROFILE, "CommandName.profile");
+  return m;
+}
+
 /** Server: What there is to see, for one who has just come. */
 function checkScene(m) {
   map(m, "scene");
@@ -167,6 +182,7 @@ function checkScene(m) {
   whole(m.edit, 0, WHOLE, "scene.edit"); // Number of its newest edit.
   real(m.now, -1e9, 1e9, "scene.now"); // Session time [s].
   m.rate = m.rate === undefined || m.rate === null ? null : real(m.rate, 5e-324, 10000, "scene.rate"); // Of the frames that follow [1/s]; absent for segments.
+  m.names = m.names === undefined ? [] : list(m.names, 0, 256, "scene.names", checkCommandName); // Of the newest commands, oldest first; absent for frames.
   return m;
 }
 
@@ -206,6 +222,7 @@ function checkChange(m) {
   m.dof = m.dof === undefined ? 0 : whole(m.dof, 0, 64, "change.dof"); // Joints of the segments.
   m.start = m.start === undefined ? 0.0 : real(m.start, -1e9, 1e9, "change.start"); // Start of the first segment [s].
   m.segments = m.segments === undefined ? [] : list(m.segments, 0, 256, "change.segments", checkSegmentRow); // These come after the first ones.
+  m.name = m.name === undefined || m.name === null ? null : checkCommandName(m.name); // What the command is called, where that's new.
   return m;
 }
 

@@ -8,6 +8,8 @@ export { decode };
 const PORTION = 256;
 /** Edits that came before the one that they build on, at most. */
 const HELD = 64;
+/** Commands whose names are kept. */
+const NAMED = 2000;
 /** Times that differ by less are the same [s]. */
 const SAME = 1e-9;
 
@@ -125,6 +127,8 @@ export class Reader {
     this.edit = 0;
     /** Up to this time [s] the copy is what happened. */
     this.past = -Infinity;
+    /** What commands are called, by their ids: {t, kind, label, speed, motion, profile}, each from its time on. */
+    this.names = new Map();
     /** What it began with. */
     this.scene = null;
     this.fetching = null;
@@ -167,9 +171,24 @@ export class Reader {
     const known = this.timeline ? this.edit : this.scene?.edit;
     if (scene.number !== this.number || (this.scene && scene.edit <= known)) return;
     this.scene = scene;
+    this.names.clear();
+    scene.names.forEach((name) => this.call(name));
     this.fetching = this.timeline ? this.timeline.segments.slice(0, this.passed()) : [];
     if (this.fetching.length < scene.segments) this.ask(now);
     else this.complete(now);
+  }
+
+  call(name) {
+    const known = this.names.get(name.command_id);
+    if (known?.at(-1).t < name.t) known.push(name);
+    else if (!known) this.names.set(name.command_id, [name]);
+    if (this.names.size > NAMED) this.names.delete(this.names.keys().next().value);
+  }
+
+  /** What a command is called at a time [s]; null where nobody said. */
+  nameOf(id, t) {
+    const names = this.names.get(id);
+    return names ? (names.findLast((name) => name.t <= t + SAME) ?? names[0]) : null;
   }
 
   /** How many segments have passed: those never change. */
@@ -209,6 +228,7 @@ export class Reader {
     while (this.timeline && this.held.has(this.edit)) {
       const change = this.held.get(this.edit);
       this.held.delete(this.edit);
+      if (change.name) this.call(change.name);
       const timeline = this.timeline.changed(change);
       if (!timeline) {
         this.number += 1;

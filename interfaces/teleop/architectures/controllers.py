@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
-from interfaces.messages.sites import ArcPacket
+from interfaces.messages.sites import ArcPacket, arcs_of
 from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig
 from robots.onboard.command_filter import CommandFilter, CommandFilterConfig
 from robots.onboard.driving import STAND, Drive, Posture
-from robots.onboard.path import MovingPath, PathGenerator
+from robots.onboard.path import MovingPath
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig, PathFollowingController
 from robots.onboard.trajectory_tracking import Reference, TrajectoryTracker
 from vrs.segment import ArcSegment
@@ -89,7 +89,6 @@ class FollowingController(DriveController):
         """
         self._filter: CommandFilter[ArcSegment] = CommandFilter(CommandFilterConfig(processing))
         self._path = MovingPath(posture)
-        self._generator = PathGenerator(self._path)
         self._controller = PathFollowingController(self._path, config, law=law)
         self._arrival = config.arrival
         self._ends: deque[float] = deque()
@@ -105,7 +104,7 @@ class FollowingController(DriveController):
     def control(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         """Lengthen the path, and follow it."""
         for _, arc in self._filter.advance(now=now + _ROUNDING):
-            self._generator.receive(arc.v, arc.w, duration=arc.duration)
+            self._path.drive(arc.v, arc.w, duration=arc.duration)
             self._ends.append(self._path.length)
         drive = self._controller.control(posture, v_before=v_before)
         place = self._controller.projection
@@ -152,7 +151,7 @@ class TimelineController:
         self.D = self._offset.D
         if arcs:
             known = arcs[-1].end
-            tail = packet.tail if abs(known - packet.complete_until) < _ROUNDING else ()
+            tail = arcs_of(packet.tail) if abs(known - packet.complete_until) < _ROUNDING else ()
             self._tracker.receive((*arcs, *tail), complete_until=known)
             self._ends.extend(arc.end for arc in arcs)
 

@@ -9,7 +9,7 @@ from typing import Protocol
 from interfaces.link.conditions import Service
 from interfaces.link.delivery import Incoming, Outgoing
 from interfaces.messages.recording import CommandRecord
-from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket
+from interfaces.messages.sites import MOST_REPEATED, ArchitectureReport, ArcPacket, ArcRow, arc_rows, arcs_of
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.onboard.driving import STAND, Drive, Posture, kept
 from robots.onboard.following import PositionSource
@@ -98,7 +98,8 @@ class ArchitectureOperatorSite:
         self.estimator = PostureEstimator(posture, gain=gain, period=model.period)
         """Where the real robot is thought to be after all commands."""
         self._transport = transport
-        self._arcs: Outgoing[ArcSegment] = Outgoing()
+        self._began = start
+        self._arcs: Outgoing[ArcRow] = Outgoing()
         self.posture = posture
         """Where the virtual robot is after all commands."""
         self._model = model
@@ -132,9 +133,10 @@ class ArchitectureOperatorSite:
             self.listener(CommandRecord(0, self._clock.now(), command, receipt))
         self.estimator.command(v, w)
         arc = known_arc(start, period, self.posture, v, w, receipt.command_id)
-        self._arcs.add(arc)
         self.posture = Posture(*advanced(self.posture, v, w, period))
-        return self._packet(arc.end, self._tail(arc))
+        row, *tail = arc_rows((arc, *self._tail(arc)), self._began)
+        self._arcs.add(row)
+        return self._packet(arc.end, tail)
 
     def estimated(self, t: float) -> Posture:
         """Where the virtual robot is when the posture estimator moves it, eq. (8)–(10).
@@ -159,7 +161,7 @@ class ArchitectureOperatorSite:
         self._arcs.acknowledge(report.received)
         self.estimator.feedback(report.executed, report.posture, report.number)
 
-    def _packet(self, complete_until: float, tail: Sequence[ArcSegment] = ()) -> ArcPacket:
+    def _packet(self, complete_until: float, tail: Sequence[ArcRow] = ()) -> ArcPacket:
         """Make a packet of what the robot may lack; arcs are numbered from 0 in it.
 
         Args:
@@ -172,7 +174,7 @@ class ArchitectureOperatorSite:
             self._arcs.acknowledge(self._arcs.count)
         elif len(arcs) > MOST_REPEATED:
             runs = [(first, arcs[:half]), (self._arcs.count - half, arcs[-half:])]
-        return ArcPacket(tuple(runs), complete_until, tuple(tail))
+        return ArcPacket(tuple(runs), complete_until - self._began, tuple(tail))
 
     def _tail(self, arc: ArcSegment) -> list[ArcSegment]:
         """How the virtual robot brakes, unless the operator goes on."""
@@ -208,7 +210,7 @@ class ArchitectureRobotSite:
         self.controller = controller
         self._surroundings = surroundings
         self._position, self._limits, self._period = position, limits, period
-        self._arcs: Incoming[ArcSegment] = Incoming(MOST_EARLY)
+        self._arcs: Incoming[ArcRow] = Incoming(MOST_EARLY)
         self._drive = Drive(0.0, 0.0)
         self._reports = 0
         self.posture = position.posture()
@@ -216,8 +218,8 @@ class ArchitectureRobotSite:
 
     def receive(self, packet: ArcPacket, *, now: float) -> None:
         """Take in a packet [s]."""
-        due = [arc for first, arcs in packet.runs for arc in self._arcs.take(first + 1, arcs)]
-        self.controller.receive(due, packet, now=now)
+        due = [row for first, rows in packet.runs for row in self._arcs.take(first + 1, rows)]
+        self.controller.receive(arcs_of(due), packet, now=now)
 
     def drive(self, *, now: float) -> Drive:
         """What to drive for the next period."""

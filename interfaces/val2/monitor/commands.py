@@ -17,6 +17,7 @@ from interfaces.val2 import forms
 from interfaces.val2.context import PROCESS_CONTROL
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
+from interfaces.val2.memory import KINDS
 from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
 from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
@@ -256,7 +257,7 @@ def _instruction(state: TerminalState, before: str, *, alone: bool = False) -> I
     if not word:
         allowed = {name: row for name, row in forms.INSTRUCTIONS.items() if not (alone and "program" in row.tags)}
         yield from _rows(allowed)(state, before)
-        yield from _names("real", "string")(state, before)
+        yield from _names("reals", "strings")(state, before)
     elif keyword in {"ENABLE", "DISABLE"}:
         yield from _rows(forms.SWITCHES)(state, before)
     elif keyword == "PARAMETER" and "=" not in before:
@@ -285,7 +286,7 @@ def _operands(state: TerminalState, before: str) -> Iterator[Word]:
         return
     yield from (Word(one.name, f"{one.usage}: {one.help}") for one in forms.FUNCTIONS.values())
     yield from (Word(name, said) for name, said in forms.OPERATORS.items())
-    yield from _names("location", "point", "real", "string")(state, before)
+    yield from _names(*KINDS)(state, before)
 
 
 def _programs(state: TerminalState, _before: str) -> Iterable[Word]:
@@ -305,8 +306,9 @@ def _names(*kinds: str) -> Completer:
     """Names in memory, an array's once."""
 
     def completes(state: TerminalState, _before: str) -> Iterable[Word]:
-        listed = [name for kind in kinds for name, _ in state.controller.memory.listing(kind)]
-        return map(Word, dict.fromkeys(name.partition("[")[0] for name in listed))
+        known = list(state.controller.memory.variables())
+        listed = [v.name for kind in kinds for v, value in known if isinstance(value, KINDS[kind])]
+        return map(Word, dict.fromkeys(listed))
 
     return completes
 
@@ -344,7 +346,7 @@ def hint(text: str, *, program: bool = False) -> str:
 
 
 _LOOK, _ARGUMENT = Need.LOOK, Need.ARGUMENT
-_LOCATIONS, _REALS, _STRINGS = _names("location", "point"), _names("real"), _names("string")
+_LOCATIONS, _REALS, _STRINGS = map(_names, KINDS)
 _SWITCHES, _STORED = _rows(forms.SWITCHES), _until("=", _files, _programs)
 _KINDS: Final = (
     ("P", "programs", "program", _programs), ("L", "locations", "location", _until("=:", _LOCATIONS)),

@@ -13,6 +13,7 @@ from interfaces.val2.monitor import commands, running
 from interfaces.val2.monitor.control import ControlState, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.state import Dialogue, Expects, OutputText, Question, Style, TerminalState, split_word
+from interfaces.val2.printer import print_step
 
 LONGEST: Final = 2048
 """Longest line [characters]."""
@@ -262,8 +263,8 @@ class TerminalMonitor:
         match event:
             case context.Typed(text):
                 state.output.append(OutputText(text, Style.TYPED))
-            case context.Traced(program, step, text):
-                state.say(f"{program} {step}: {text}", style=Style.NOTE)
+            case context.Traced(program, number, done):
+                state.say(f"{program} {number}: {print_step(done)}", style=Style.NOTE)
             case context.Asked(text):
                 self._prompted = text
             case context.ProgramPaused(program, step, word, 0):
@@ -284,8 +285,6 @@ class TerminalMonitor:
                 state.fail(error)
             case context.Warned(text):
                 state.say(f"*Warning* {text}", style=Style.NOTE)
-            case context.SignalChanged():
-                pass
 
     def advance(self, *, now: float) -> None:
         """Do what is due: of the controller, of what is shown again and again, and lines that have waited."""

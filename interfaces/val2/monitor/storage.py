@@ -10,18 +10,16 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.memory import MOST_VALUES, Memory
+from interfaces.val2.memory import KINDS, MOST_VALUES, Memory
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, named, nothing, pieces
 from interfaces.val2.parser import parse_expression
 from interfaces.val2.printer import print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file, with_called
 from interfaces.val2.syntax import Program, Variable
-from interfaces.val2.values import PrecisionPoint, Transformation, Value
+from interfaces.val2.values import Value
 
 T = TypeVar("T")
-_TYPES: Final[dict[str, Any]] = {"locations": (Transformation, PrecisionPoint), "reals": float, "strings": str}
-"""Types of values, by the parts of files that hold them."""
 _WORDS: Final = {"programs": "program name", "locations": "location", "reals": "value", "strings": "value"}
 """What one of them is called that there isn't."""
 _PATTERN: Final = re.compile(r"[#$]?[A-Za-z*?][A-Za-z0-9._*?]*(\[[-0-9, *]*\])?")
@@ -116,7 +114,7 @@ def free(state: TerminalState, _rest: str) -> None:
     """FREE: what is in memory."""
     memory = state.controller.memory
     steps = sum(len(program.steps) for program in memory.programs.values())
-    values = {kind: len(_entries(memory, kind)) for kind in _TYPES}
+    values = {kind: len(_entries(memory, kind)) for kind in KINDS}
     state.say(
         *layout.table([
             ("Programs", f"{len(memory.programs)}, of {steps} steps"),
@@ -211,22 +209,19 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
         if names:
             programs = with_called(programs, chosen(programs, names, _WORDS["programs"]))
             used = {variable.name for variable in _variables(tuple(programs.values()))}
-    values = {}
-    for kind in _TYPES:
-        entries = _entries(memory, kind) if parts in {"", kind} else {}
-        if parts == kind:
-            entries = chosen(entries, names, kind.removesuffix("s"))
-        elif names:
-            entries = {shown: entry for shown, entry in entries.items() if entry.variable.name in used}
-        values[kind] = tuple(entries.values())
+    entries: dict[str, NamedValue] = {}
+    for kind in KINDS if not parts else KINDS.keys() & {parts}:
+        known = _entries(memory, kind)
+        entries |= chosen(known, names, kind.removesuffix("s")) if parts else known
+    values = [entry for entry in entries.values() if parts or not names or entry.variable.name in used]
     signals, dialect = () if parts else state.controller.cell, state.controller.dialect
-    return SourceFile(name, tuple(programs.values()), **values, signals=signals, dialect=dialect)
+    return SourceFile(name, tuple(programs.values()), tuple(values), signals, dialect)
 
 
 def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:
     """Variables of a kind, by how they're written."""
     entries = (NamedValue(*one) for one in memory.variables())
-    return {layout.variable(e.variable): e for e in entries if isinstance(e.value, _TYPES[kind])}
+    return {layout.variable(e.variable): e for e in entries if isinstance(e.value, KINDS[kind])}
 
 
 def _variables(node: object) -> Iterator[Variable]:

@@ -132,7 +132,7 @@ class EngineRobot(RobotPort):
             clock.set(max(now, clock.now()))
         if command is None:
             return self.engine.undo()
-        return self.engine.execute(command)  # type: ignore[arg-type]
+        return self.engine.execute(command)  # type: ignore[return-value]
 
     @override
     def outcome(self, number: int, *, now: float) -> Issued | None:

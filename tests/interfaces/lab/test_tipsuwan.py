@@ -315,7 +315,7 @@ def test_a_letter_says_what_became_of_a_path(arrivals, error, letter, monkeypatc
         return PathMeasures(arrived, 1.0, 0.1 if control is NetworkControl.DIRECT else error, 1.0, Reason.SLOW)
 
     monkeypatch.setattr(extent, "measured", measures)
-    assert extent.outcome_letter(0, 0.2, extent.varied("alpha", 2.0, 15.0)) == letter
+    assert extent.outcome_letter(0, 0.2, extent.varied("alpha", 2.0, 15.0), {}) == letter
 
 
 def test_enough_runs_succeed_by_their_share_not_by_its_interval():

@@ -12,7 +12,7 @@ from interfaces.messages import recording as m
 from interfaces.recording import Recording, RecordingWriter
 from interfaces.recording.channels import Message
 from interfaces.recording.history import edit_entries, whole_entries
-from interfaces.recording.poses import link_transforms, real_pose, virtual_pose
+from interfaces.recording.poses import link_transforms, pose_of
 from robots import puma560
 from tests.interfaces.stream.same import same
 from vrs import Engine, Insertion, JointTarget, Lateness, ManualClock, MotionCommand
@@ -75,7 +75,7 @@ def motion(
         if t >= shown + drawn:
             shown = t
             links = MODEL.links(q)
-            found += [(t, virtual_pose(t, links[-1])), (t, real_pose(t, links[-1]))]
+            found += [(t, pose_of("virtual", t, links[-1])), (t, pose_of("real", t, links[-1]))]
             found.append((t, link_transforms(t, [("virtual", links), ("real", links)])))
     return found, engine, timelines
 

@@ -47,7 +47,7 @@ class Page:
         self.page.goto(self.url, timeout=1000 * PATIENCE)
         self.wait("document.getElementById('station')?.dataset.ready === ''")
         # Software draws slowly; tests look at the arms' joints, not at their pictures.
-        self.page.evaluate("station.shared.pane.scene.pacing.set(3)")
+        self.page.evaluate("station.scene.pacing.set(3)")
         if live:
             self.wait("station.session.link === 'live' && station.session.state !== null")
         return self
@@ -75,7 +75,7 @@ class Page:
         directory = os.environ.get("VRS_SHOTS")
         if directory is None:
             return
-        pacing = "station.shared.pane.scene.pacing"
+        pacing = "station.scene.pacing"
         self.page.evaluate(f"{pacing}.set(0); {pacing}.viewer.set_dirty()")
         self.page.wait_for_timeout(800)
         self.page.screenshot(path=Path(directory) / f"{name}.png")

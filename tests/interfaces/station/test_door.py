@@ -43,7 +43,7 @@ def test_tokens_and_a_server_that_goes_and_comes(browser: Any, tokens: tuple[Pat
         page.shoot("token")
         enter(page, known[Role.OPERATOR])
         page.wait("station.session.link === 'live' && station.session.state !== null")
-        page.wait("station.shared.pane.scene.node('vrs', 'virtual', 'body', '6').children.length > 0")
+        page.wait("station.scene.node('vrs', 'virtual', 'body', '6').children.length > 0")
         assert page.get("station.session.welcome.role") == "operator"
         assert known[Role.OPERATOR] not in page.page.url
         page.take_control()

@@ -121,19 +121,19 @@ def test_what_a_command_changes_of_what_is_shown_is_falsified(page: Page) -> Non
     )
     page.page.evaluate(
         f"""var move = station.session.timeline.segments.find((s) => s.commandId === {move});
-        station.shared.pane.show(move.start + 0.4)"""
+        station.cursor = move.start + 0.4"""
     )
     page.wait("badge.dataset.status === 'predicted'")
     page.page.locator(f".move[data-id='{move}']").press("Shift+ArrowRight")
     page.wait(f"said.some((text) => text.startsWith('falsified') && text.includes('Changed by #{move}'))")
     page.wait("badge.dataset.status === 'predicted'")
     # What changes behind the time that is shown falsifies nothing.
-    page.page.evaluate("said.length = 0; station.shared.pane.show(station.session.now + 3)")
+    page.page.evaluate("said.length = 0; station.cursor = station.session.now + 3")
     page.page.locator(f".move[data-id='{move}']").press("Delete")
     page.wait(f"!station.session.timeline.segments.some((s) => s.commandId === {move})")
-    page.wait("station.session.now > station.shared.pane.cursor - 1")
+    page.wait("station.session.now > station.cursor - 1")
     assert [text for text in page.get("said") if text.startswith("falsified")] == []
-    page.page.evaluate("station.shared.pane.show(station.session.now - 1)")
+    page.page.evaluate("station.cursor = station.session.now - 1")
     page.wait("badge.dataset.status === 'confirmed'")
 
 

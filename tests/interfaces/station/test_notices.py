@@ -59,7 +59,10 @@ def gone(page: Page) -> None:
 
 
 def test_what_is_refused_is_said_where_the_hand_is(page: Page) -> None:
-    page.page.click("[data-pose=ready]")
+    ready = page.page.locator("[data-pose=ready]")
+    assert ready.get_attribute("aria-disabled") == "true"
+    assert "Take control first" in ready.get_attribute("title")
+    ready.click(force=True)
     told(page, "you don't have control", "[data-pose=ready]")
     page.page.keyboard.press("Escape")
     gone(page)
@@ -165,12 +168,12 @@ def test_jogging_and_dragging_change_nothing_of_what_was_shown(page: Page) -> No
         page.page.keyboard.up(key)
         page.rest()
     pane = page.page.locator("#pane").bounding_box()
-    at = page.get("station.shared.drag.project(station.shared.drag.tool())")
+    at = page.get("station.drag.project(station.drag.tool())")
     page.page.mouse.move(pane["x"] + at["x"], pane["y"] + at["y"])
     page.page.mouse.down()
     page.page.mouse.move(pane["x"] + at["x"] - 30, pane["y"] + at["y"] - 30, steps=6)
     page.page.mouse.up()
-    page.wait("station.shared.drag.target === null")
+    page.wait("station.drag.target === null")
     page.page.click("[data-pose=ready]")
     page.page.keyboard.press("Space")
     page.rest()

@@ -262,11 +262,11 @@ def test_plots_say_what_they_show_and_look_back(page: Page, tmp_path: Path) -> N
 
     page.page.evaluate("document.getElementById('tab-panels').scrollTo(0, 0)")
     cursor = page.get("station.session.now") - 12
-    page.page.evaluate(f"station.shared.pane.show({cursor})")
+    page.page.evaluate(f"station.cursor = {cursor}")
     page.wait("document.getElementById('plots-shows').textContent.includes('values at')")
     chart = f"{PLOTS}.charts[0]"
     page.wait(f"{chart}.cursor === {cursor} && {chart}.plot.scales.x.max < {cursor} + 15.1")
-    page.page.evaluate("station.shared.pane.show(null)")
+    page.page.evaluate("station.cursor = null")
     page.wait(f"{chart}.cursor === null")
 
     with page.page.expect_download() as download:

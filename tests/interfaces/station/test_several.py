@@ -26,7 +26,7 @@ from tests.interfaces.station.test_driving import gone, postures, rest
 
 SERVE = ("serve", "--robot", "puma560", "--robot", "ipr", "--link-loss", "hold", "--body", "ideal", "--port", "0")
 PLACE = """name => [['beside', name], ['beside', name, 'real', 'body', '0']].map((path) => {
-    const node = station.shared.pane.scene.node(...path);
+    const node = station.scene.node(...path);
     node.updateMatrix();
     return node.matrix.toArray(); })"""
 """Where another robot's world is in a page's, and its first body in that."""
@@ -66,14 +66,14 @@ def test_a_page_of_each_robot_shows_both_and_moves_its_own(browser: Any, server:
         arm.open()
         base.open()
         base.page.click("#robots a[href='/robots/ipr/']")
-        base.settled("station.drives && station.shared.pane")
-        base.page.evaluate("station.shared.pane.scene.pacing.set(3)")
+        base.settled("station.drives && station.scene")
+        base.page.evaluate("station.scene.pacing.set(3)")
         for page in (arm, base):
             links = page.page.locator("#robots a")
             assert links.all_text_contents() == ["puma560", "ipr"]
         base.wait("Boolean(station.session.state.real)")
         for page, other in ((arm, "ipr"), (base, "puma560")):
-            has = f"station.shared.pane.scene.node('beside', '{other}', 'real', 'body', '0').children.length > 0"
+            has = f"station.scene.node('beside', '{other}', 'real', 'body', '0').children.length > 0"
             page.wait(has)
         base.take_control()
         arm.take_control()

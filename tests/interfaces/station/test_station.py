@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import SERVE, Page, paged, station, until
 
-TOOL = "station.shared.drag.tool()"
+TOOL = "station.drag.tool()"
 HOLDS = "station.session.holds"
 
 
@@ -163,23 +163,23 @@ def test_the_tool_goes_where_it_is_dragged(page: Page) -> None:
     page.wait("!document.getElementById('handle').hidden")
     pane = page.page.locator("#pane").bounding_box()
     start = page.get(TOOL)
-    at = page.get(f"station.shared.drag.project({TOOL})")
+    at = page.get(f"station.drag.project({TOOL})")
     x, y = pane["x"] + at["x"], pane["y"] + at["y"]
-    camera = page.get("station.shared.pane.scene.viewer.camera.position.toArray()")
+    camera = page.get("station.scene.viewer.camera.position.toArray()")
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     page.page.mouse.move(x - 70, y - 45, steps=6)
-    target = page.get("station.shared.drag.target")
+    target = page.get("station.drag.target")
     assert target is not None
     page.shoot("drag")
     page.page.mouse.up()
     assert sum((a - b) ** 2 for a, b in zip(target, start, strict=True)) ** 0.5 > 0.05
-    page.wait("station.shared.drag.target === null")
+    page.wait("station.drag.target === null")
     page.rest()
     assert page.get(TOOL) == pytest.approx(target, abs=0.005)
     real = page.get("station.chain.toolAt(station.session.state.q)")
     assert real == pytest.approx(target, abs=0.005)
-    assert page.get("station.shared.pane.scene.viewer.camera.position.toArray()") == pytest.approx(camera)
+    assert page.get("station.scene.viewer.camera.position.toArray()") == pytest.approx(camera)
 
 
 def scheduled(page: Page) -> dict[str, tuple[float, float]]:
@@ -294,24 +294,26 @@ def test_one_looks_back_while_the_robot_goes_on(page: Page) -> None:
     page.page.mouse.down()
     page.page.mouse.move(track["x"] + 5, track["y"] + 90, steps=3)
     page.page.mouse.up()
-    shown = page.get("station.shared.pane.cursor")
+    shown = page.get("station.cursor")
     assert shown < page.get("station.session.now") - 5
     assert "Confirmed" in page.page.locator("#badge").text_content()
     assert "another time" in page.page.locator("#banner").text_content()
-    drawn = "station.shared.pane.scene.node('vrs', '%s', 'body', '6').position.toArray()"
+    drawn = "station.scene.node('vrs', '%s', 'body', '6').position.toArray()"
     then = page.get(f"station.chain.links(station.session.timeline.joints({shown})).at(-1).slice(12, 15)")
     assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
     page.page.select_option("#when", "now")
     before = page.virtual
     # Nobody steers by a picture of another time; a move that is planned is one's own business.
-    page.page.locator("button[aria-label='Joint 1 up']").click(delay=200)
+    up = page.page.locator("button[aria-label='Joint 1 up']")
+    assert up.get_attribute("title") == "You look at another time: press Live to steer."
+    up.click(delay=200, force=True)
     page.wait("document.getElementById('notice').textContent.includes('press Live to steer')")
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.press("q", delay=200)
     assert page.virtual == pytest.approx(before, abs=1e-9)
     page.page.click("[data-pose=nominal]")
     page.until(lambda: moved(page, 0.3, before))
-    assert page.get("station.shared.pane.cursor") == shown
+    assert page.get("station.cursor") == shown
     page.shoot("past")
     assert page.get(drawn % "virtual") == pytest.approx(then, abs=1e-9)
     page.page.click("#live")
@@ -334,8 +336,10 @@ def test_a_second_one_watches_until_control_is_given(browser: Any, server: Child
         second.shoot("watching")
         before = page.virtual
         second.page.evaluate("window.said = []; station.on('problem', (problem) => said.push(problem.text))")
-        second.page.click("[data-pose=ready]")
-        second.page.locator("button[aria-label='Joint 1 up']").click(delay=300)
+        second.page.click("[data-pose=ready]", force=True)
+        up = second.page.locator("button[aria-label='Joint 1 up']")
+        assert "has control" in up.get_attribute("title")
+        up.click(delay=300, force=True)
         second.page.keyboard.press("q", delay=300)
         # A page that pretends to have control is refused by the server.
         second.page.evaluate(

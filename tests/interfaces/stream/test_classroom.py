@@ -1,5 +1,7 @@
 """A class at one robot: who comes in by a code, who is here, and who has control next."""
 
+from random import Random
+
 import pytest
 
 from interfaces.messages import Order, control
@@ -442,3 +444,52 @@ def test_a_program_of_this_process_has_no_number_and_waits_as_others():
     lesson.hub.leasing.wish(seat, Release(2, lesson.hub.leasing.lease.epoch), 0.6)
     assert told(ada, now=0.6) == ["offered"]
     assert lesson.hub.leasing.wish(seat, Acquire(3), 0.7).code is ProblemCode.LEASE
+
+
+# Whatever they do.
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_they_do_one_has_control_and_the_first_who_is_here_is_offered_it(seed):
+    random, lesson, now = Random(seed), Lesson(stops=False), 0.0
+    leasing = lesson.hub.leasing
+    room = leasing.classroom
+    pupils = [lesson.teacher(), *(lesson.pupil(f"pupil {k}", address=str(k)) for k in range(6))]
+    away = set()
+    for _ in range(300):
+        now += random.choice((0.0, 0.01, 0.1, 1.0, 3.0))
+        k = random.randrange(len(pupils))
+        pupil, other = pupils[k], random.randrange(1, 9)
+        epoch = pupil.lease.epoch or random.randrange(1, 50)
+        message = random.choice(
+            (
+                RequestControl(1), RequestControl(1), Acquire(1), Release(1, epoch), control.Beat(epoch),
+                Withdraw(1), Withdraw(1, other), GiveControl(1, other), TakeOver(1), Who(1), None, None,
+            )
+        )  # fmt: skip
+        if k in away:
+            session = pupil.welcome.session
+            token = ADMIN if k == 0 else lesson.code(now=now)
+            role = Role.ADMIN if k == 0 else Role.OPERATOR
+            pupils[k] = Pupil(lesson.hub, role=role, token=token, session=session, address=str(k), now=now)
+            assert pupils[k].welcome is not None
+            away.discard(k)
+        elif message is None:
+            pupil.leave(now=now, done=random.random() < 0.5)
+            away.add(k)
+        else:
+            pupil.tell(message, now=now)
+        if random.random() < 0.5:
+            lesson.hub.stopped(now=now)
+        here = [one for j, one in enumerate(pupils) if j not in away]
+        for one in here:
+            one.look(now=now)
+        free, waiting = lesson.hub.lease_state is LeaseState.FREE, room.waiting
+        assert sum(one.lease.yours for one in here) <= 1
+        assert len(set(waiting)) == len(waiting)
+        assert leasing.holder not in waiting
+        assert (room.offered is not None) == (free and bool(waiting))
+        assert room.offered is None or (room.offered.here and room.offered in waiting)
+        offered = [one for one in here if one.lease.offered_until is not None]
+        assert [one.lease.member for one in offered] == ([room.offered.member] if room.offered else [])
+        assert sorted(one.lease.waiting for one in here if one.lease.waiting) == list(range(1, len(waiting) + 1))

@@ -309,7 +309,7 @@ class Rig:
         source = parse_file(text, "test")
         for program in source.programs:
             self.controller.memory.programs[program.name] = program
-        for entry in (*source.locations, *source.reals, *source.strings):
+        for entry in source.values:
             self.controller.memory.set(entry.variable, entry.value)
         self.controller.cell = source.signals
         return source.programs[0].name

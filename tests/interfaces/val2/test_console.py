@@ -28,6 +28,7 @@ from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
 from interfaces.val2.monitor.terminal import Keyboard, LineLexer, Terminal, style
 from interfaces.val2.motion import arm_for
+from interfaces.val2.syntax import Variable
 from robots import puma560
 from vrs.clock import ManualClock, WallClock
 from vrs.engine import Engine
@@ -215,7 +216,7 @@ def test_ctrl_c_clears_a_line_and_tab_completes_one(tmp_path):
     async def scenario(keys):
         keys.press("nonsense\x03")
         keys.press("do x = 3\r")
-        await keys.until(lambda: keys.controller.memory.listing("real") == [("x", 3.0)])
+        await keys.until(lambda: [*keys.controller.memory.variables()] == [(Variable("x"), 3.0)])
         keys.press("calib\t\r")
         await keys.until(lambda: keys.monitor.prompt.startswith("Are you sure"))
         keys.press("\x03")

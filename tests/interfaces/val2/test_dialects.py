@@ -57,7 +57,7 @@ def test_what_is_printed_says_in_which_dialect_it_is() -> None:
     assert ";VAL2\n.LOCATIONS\n" in text
     again = parse_file(text, "angles.v2")
     assert again.programs == source.programs
-    for one, other in zip(source.locations, again.locations, strict=True):
+    for one, other in zip(source.of("locations"), again.of("locations"), strict=True):
         np.testing.assert_allclose(one.value.X, other.value.X, atol=1e-9)
 
 

@@ -145,7 +145,7 @@ def test_editing_at_the_monitor(tmp_path):
         "    2        MOVE here1",
         ".END",
     ]
-    assert [name for name, _ in sitting.controller.memory.listing("location")] == ["here1"]
+    assert [variable.name for variable, _ in sitting.controller.memory.variables()] == ["here1"]
     assert sitting.type("EDIT fresh,2").splitlines()[1] == "    2  MOVE here1"
     sitting.type("D", "Q", "EDIT")
     assert sitting.monitor.prompt == "1.? "

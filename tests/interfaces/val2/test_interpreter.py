@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from interfaces.val2.context import ProgramFailed, SignalChanged
+from interfaces.val2.context import MOST_CALLS, ProgramFailed, ProgramState, SignalChanged
 from interfaces.val2.errors import ValError
-from interfaces.val2.interpreter import MOST_CALLS, ProgramState
 from tests.interfaces.val2.rig import FakeArm, Rig, body, failure, run
 
 

@@ -7,10 +7,18 @@ import re
 import pytest
 
 from interfaces.val2 import parser
+from interfaces.val2.memory import Memory
 from interfaces.val2.monitor.state import SLICE
+from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Variable
+from interfaces.val2.values import Transformation
 
 from .sitting import HELLO, LOOP
+
+
+def located(memory: Memory) -> list[str]:
+    """Names of locations."""
+    return [variable.name for variable, value in memory.variables() if isinstance(value, Transformation)]
 
 
 def test_delete_and_zero_ask_and_only_y_does_it(sitting):
@@ -69,7 +77,7 @@ def test_store_keeps_a_program_with_all_that_it_uses_and_asks_before_it_writes_o
     sitting.type("ZERO", "y", "LOAD part")
     assert sorted(sitting.controller.memory.programs) == ["main", "sub"]
     assert sitting.type("LISTR") == "y = 2\n"
-    assert [name for name, _ in sitting.controller.memory.listing("location")] == ["p"]
+    assert located(sitting.controller.memory) == ["p"]
     assert sitting.type("FLIST") == "part\n"
     assert list(tmp_path.iterdir()) == [tmp_path / "part.v2"]
 
@@ -108,7 +116,7 @@ def test_a_link_leads_nowhere_either_and_a_broken_file_changes_nothing(sitting, 
     sitting.type("DO x = 1", "DO SET p = NULL")
     assert sitting.type("LOAD half").startswith("*Variable type mismatch*")
     assert sitting.type("LISTR") == "x = 1\n"
-    assert [name for name, _ in sitting.controller.memory.listing("location")] == ["p"]
+    assert located(sitting.controller.memory) == ["p"]
 
 
 def big(count):
@@ -144,14 +152,14 @@ def test_a_load_that_is_left_has_loaded_nothing(sitting, tmp_path, how):
     (tmp_path / "big.v2").write_text(big(300))
     sitting.line("LOAD big")
     for _ in range(100_000):
-        if len(sitting.controller.memory.listing("location")) > 50:
+        if len(located(sitting.controller.memory)) > 50:
             break
         sitting.monitor.advance(now=sitting.now)
     getattr(sitting.monitor, how)(now=sitting.now)
     memory = sitting.controller.memory
-    assert (memory.programs, memory.listing("real")) == ({}, [])
-    ((name, value),) = memory.listing("location")
-    assert (name, value.X[0, 3]) == ("p[0]", 1.0)
+    assert memory.programs == {}
+    ((variable, value),) = memory.variables()
+    assert (print_expression(variable), value.X[0, 3]) == ("p[0]", 1.0)
 
 
 def test_many_values_arent_loaded_while_a_program_runs(sitting, tmp_path):

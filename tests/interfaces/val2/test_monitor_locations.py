@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Number, Variable
 from interfaces.val2.values import PrecisionPoint, Transformation
 from tests.interfaces.val2.bench import from_oat, to_oat
@@ -106,12 +107,12 @@ def test_point_defines_and_changes(sitting):
 
 def test_teach_records_and_lets_commands_in_between(sitting):
     sitting.type("TEACH p[1]", "", "DO DRIVE 1,10,100", "", "E")
-    names = [name for name, _ in sitting.controller.memory.listing("location")]
+    names = [print_expression(variable) for variable, _ in sitting.controller.memory.variables()]
     assert names == ["p[1]", "p[2]"]
-    first, second = (value for _, value in sitting.controller.memory.listing("location"))
+    first, second = (value for _, value in sitting.controller.memory.variables())
     assert np.linalg.norm(first.X[:3, 3] - second.X[:3, 3]) > 20.0
     sitting.type("TEACH #q", "", "", "E")
-    assert [name for name, _ in sitting.controller.memory.listing("point")] == ["#q1", "#q2"]
+    assert [variable.name for variable, _ in sitting.controller.memory.variables()][:2] == ["#q1", "#q2"]
     assert sitting.monitor.prompt == "."
 
 

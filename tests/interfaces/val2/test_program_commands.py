@@ -6,9 +6,8 @@ import math
 
 import pytest
 
-from interfaces.val2.context import Asked, ProgramEnded, ProgramFailed, ProgramPaused, Warned
+from interfaces.val2.context import Asked, ProgramEnded, ProgramFailed, ProgramPaused, ProgramState, Warned
 from interfaces.val2.errors import ValError
-from interfaces.val2.interpreter import ProgramState
 from interfaces.val2.syntax import Variable
 from tests.interfaces.val2.rig import Rig, body, failure, run
 

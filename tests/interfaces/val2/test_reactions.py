@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from interfaces.val2.context import ProgramEnded
+from interfaces.val2.context import ProgramEnded, ProgramState
 from interfaces.val2.errors import ValError
-from interfaces.val2.interpreter import ProgramState
 from interfaces.val2.signals import Reaction, Reactions
 from tests.interfaces.val2.rig import FakeArm, Rig, body
 

@@ -61,13 +61,16 @@ def test_every_section_is_read():
     source = parse_file(WHOLE, "tray.v2")
     assert source.name == "tray.v2"
     assert [p.name for p in source.programs] == ["main", "second"]
-    assert source.locations == (
+    assert tuple(source.of("locations")) == (
         NamedValue(element("p1"), from_oat(0, 300.5, -200, 90, -90, 0)),
         NamedValue(element("p", 1, 2), from_oat(1, 2, 3, 4, 5, 6)),
         NamedValue(element("#safe"), PrecisionPoint((0, -90, 90, 0, 0, 0))),
     )
-    assert source.reals == (NamedValue(element("n"), 3.0), NamedValue(element("x", 0), -0.0015))
-    assert source.strings == (NamedValue(element("$a"), "hello; x"), NamedValue(element("$b", 3), 'say "hi"'))
+    assert source.of("reals") == [NamedValue(element("n"), 3.0), NamedValue(element("x", 0), -0.0015)]
+    assert source.of("strings") == [
+        NamedValue(element("$a"), "hello; x"),
+        NamedValue(element("$b", 3), 'say "hi"'),
+    ]
     assert source.signals == (
         SignalRule(1001, parse_expression("SIG(1)"), after=2.0, lasting=0.5),
         SignalRule(2002, parse_expression("TRUE"), at_time=5.0),
@@ -93,7 +96,9 @@ def test_files_as_people_write_them_come_back(path):
     source = parse_file(path.read_bytes().decode(), path.name)
     again = parse_file(print_file(source), path.name)
     assert again.programs == source.programs
-    assert (again.reals, again.strings, again.signals) == (source.reals, source.strings, source.signals)
+    assert again.signals == source.signals
+    for kind in ("reals", "strings"):
+        assert again.of(kind) == source.of(kind)
     assert print_file(again) == print_file(source)
 
 
@@ -105,10 +110,10 @@ lengths = st.floats(-2000, 2000)
 @given(lengths, lengths, lengths, angles, st.floats(-90, 90) | st.sampled_from([-90.0, 90.0]), angles)
 def test_every_pose_comes_back(x, y, z, o, a, t):
     pose = from_oat(x, y, z, o, a, t)
-    text = print_file(SourceFile("f", locations=(NamedValue(element("p"), pose),)))
-    (entry,) = parse_file(text, "f").locations
+    text = print_file(SourceFile("f", values=(NamedValue(element("p"), pose),)))
+    (entry,) = parse_file(text, "f").values
     assert np.allclose(entry.value.X, pose.X, rtol=0, atol=2e-8)
-    assert print_file(SourceFile("f", locations=(entry,))) == text
+    assert print_file(SourceFile("f", values=(entry,))) == text
 
 
 @settings(deadline=None, derandomize=True, database=None, max_examples=200)
@@ -120,9 +125,11 @@ def test_every_pose_comes_back(x, y, z, o, a, t):
 def test_joints_reals_and_strings_come_back_exactly(joints, real, text):
     source = SourceFile(
         "f",
-        locations=(NamedValue(element("#p"), PrecisionPoint(tuple(joints))),),
-        reals=(NamedValue(element("r", 2), real),),
-        strings=(NamedValue(element("$s"), text[:60]),),
+        values=(
+            NamedValue(element("#p"), PrecisionPoint(tuple(joints))),
+            NamedValue(element("r", 2), real),
+            NamedValue(element("$s"), text[:60]),
+        ),
     )
     assert parse_file(print_file(source), "f") == source
 

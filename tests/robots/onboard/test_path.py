@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots.onboard.driving import Posture
-from robots.onboard.path import Arc, MovingPath, PathGenerator, Pivot
+from robots.onboard.path import Arc, MovingPath, Pivot
 from vrs import ArcSegment
 from vrs.errors import InvalidValueError
 from vrs.mobile import wrapped
@@ -154,33 +154,31 @@ def test_an_empty_path_is_a_point():
 def test_equal_pieces_are_one_and_passed_ones_are_forgotten():
     """A day of driving at ten commands a second, here ten minutes of it: some pieces are kept, never more."""
     path = MovingPath((0, 0, 0))
-    generator = PathGenerator(path)
     rng = np.random.default_rng(1)
     most, x = 0, Posture(0, 0, 0)
     for i in range(6_000):
         if i % 50 == 0:
             v, w = (0.3, float(rng.uniform(-0.5, 0.5)))
-        assert generator.receive(v, w + (1e-3 if i % 3 else 0.0), duration=0.1)
+        assert path.drive(v, w + (1e-3 if i % 3 else 0.0), duration=0.1)
         if i > 20:
-            x = Posture(*generator.posture)
+            x = Posture(*path.end)
             path.locate(x)
         most = max(most, len(path))
     assert most < 60
     assert path.length == pytest.approx(6_000 * 0.03)
     same = MovingPath((0, 0, 0))
     for _ in range(1000):
-        PathGenerator(same).receive(0.3, 0.2, duration=0.1)
+        same.drive(0.3, 0.2, duration=0.1)
     assert len(same) == 1
 
 
 def test_a_full_path_refuses_and_stays_as_it_was():
     path = MovingPath((0, 0, 0), capacity=2)
-    generator = PathGenerator(path)
-    assert generator.receive(0.3, 0.1, duration=0.1)
-    assert generator.receive(0.3, 0.2, duration=0.1)
-    before = path.end, path.length, generator.posture
-    assert not generator.receive(0.3, 0.3, duration=0.1)
-    assert (path.end, path.length, generator.posture) == before
+    assert path.drive(0.3, 0.1, duration=0.1)
+    assert path.drive(0.3, 0.2, duration=0.1)
+    before = path.end, path.length
+    assert not path.drive(0.3, 0.3, duration=0.1)
+    assert (path.end, path.length) == before
 
 
 COMMANDS = st.lists(
@@ -193,10 +191,9 @@ COMMANDS = st.lists(
 def test_the_generator_restores_the_virtual_robots_path(commands, start):
     """Its end is the composition of the exact arcs, whatever is driven as a pivot; the pieces say the same."""
     path = MovingPath(start)
-    generator = PathGenerator(path)
     posture = np.asarray(start)
     for v, w in commands:
-        assert generator.receive(v, w, duration=0.1)
+        assert path.drive(v, w, duration=0.1)
         posture = ArcSegment(0.0, 0.1, tuple(posture), v, w).value(0.1)
     assert path.end == pytest.approx(tuple(posture), abs=1e-10)
     turned = sum(p.angle if isinstance(p, Pivot) else p.curvature * p.length for p in path.pieces())
@@ -207,8 +204,7 @@ def test_the_generator_restores_the_virtual_robots_path(commands, start):
 
 @pytest.mark.parametrize("bad", [lambda: Arc(0.0, 0.0), lambda: Arc(math.nan, 1.0), lambda: Arc(0.0, 1.0, 0),
                                  lambda: Pivot(0.0), lambda: MovingPath((0, 0, math.inf)),
-                                 lambda: PathGenerator(MovingPath((0, 0, 0)))
-                                 .receive(math.nan, 0.0, duration=0.1)])  # fmt: skip
+                                 lambda: MovingPath((0, 0, 0)).drive(math.nan, 0.0, duration=0.1)])  # fmt: skip
 def test_impossible_values_are_refused(bad):
     with pytest.raises(InvalidValueError):
         bad()

@@ -1,0 +1,68 @@
+"""Plan files for pages: what one holds, as commands that the page then gives."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+import msgspec
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from interfaces.messages.control import Role
+from interfaces.messages.fields import plain
+from interfaces.runtime.plan import MAX_BYTES, parse_plan
+from interfaces.station.record import BURST, RATE, body, said
+from interfaces.stream.access import Access, bearer
+from interfaces.stream.limits import Bucket
+from interfaces.stream.server import HEADERS
+from vrs.clock import Clock
+from vrs.errors import FormatError, VrsError
+from vrs.model import RobotModel
+
+MOST: Final = 500
+"""Moves that a page gives one after the other."""
+
+
+class Plans:
+    """Reads the plan files of pages: `POST /plan?name=NAME` answers with their commands, or what is wrong where."""
+
+    def __init__(self, model: RobotModel, access: Access, clock: Clock) -> None:
+        """Wait for files.
+
+        Args:
+            model: The robot, for its limits, named poses and kinematics.
+            access: Who may ask: nothing moves by it, but it takes time.
+            clock: Session time.
+        """
+        self._model, self._access, self._clock = model, access, clock
+        self._asked = Bucket(RATE, BURST, clock.now())
+
+    @property
+    def routes(self) -> list[BaseRoute]:
+        """What it answers."""
+        return [Route("/plan", self._answer, methods=["POST"])]
+
+    async def _answer(self, request: Request) -> Response:
+        try:
+            if refusal := self._access.refusal(Role.OPERATOR, bearer(request.headers.get("authorization", ""))):
+                return said(403, refusal)
+            if not self._asked.take(self._clock.now()):
+                return said(429, "too many requests: try again in a moment")
+            name = request.query_params.get("name", "plan")[:100]
+            found = await asyncio.to_thread(self._read, await body(request, MAX_BYTES), name)
+            return Response(found, 200, HEADERS, "application/json")
+        except ClientDisconnect:
+            return said(408, "the request didn't come to its end in time")
+        except VrsError as error:
+            return said(400, str(error))
+
+    def _read(self, data: bytes, name: str) -> bytes:
+        plan = parse_plan(data, name, self._model)
+        if plan.payloads:
+            raise FormatError(plan.payloads[0].where, "a payload can't be taken or released here: moves alone")
+        if len(plan.motions) > MOST:
+            raise FormatError(name, f"holds {len(plan.motions)} moves: the page takes up to {MOST}")
+        commands = [motion.command for motion in plan.motions]
+        return msgspec.json.encode({"title": plan.title, "commands": commands}, enc_hook=plain)
