@@ -5,7 +5,7 @@ import { ACROSS } from "./happenings.js";
 import { DriveSamples, Samples } from "./samples.js";
 import { Table } from "./table.js";
 import { theme } from "./theme.js";
-import { clockText, effect, html, observed, useEffect, useMemo, useRef } from "./ui.js";
+import { clockText, effect, html, observed, save, useEffect, useMemo, useRef } from "./ui.js";
 
 /** Windows that one may choose: seconds, name, time between two pictures of a plot [ms], and two comparisons [ms]. */
 const SPANS = [[30, "30 s", 180, 1000], [120, "2 min", 300, 2500], [600, "10 min", 800, 8000]];
@@ -188,14 +188,10 @@ class LivePlots extends Plots {
   }
 
   /** Let the browser keep what is kept here as a file. */
-  async save() {
+  async keep() {
     const { samples, station } = this;
     const parts = await samples.table.csv((name) => samples.headed(name));
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob(parts, { type: "text/csv" }));
-    link.download = `vrs-${station.drives ? "drive" : "plots"}-${Math.round(station.session.now ?? 0)}s.csv`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    save(parts, `vrs-${station.drives ? "drive" : "plots"}-${Math.round(station.session.now ?? 0)}s.csv`);
     station.announce(`${samples.table.length} samples saved.`);
   }
 }
@@ -213,7 +209,7 @@ export function Panel({ station }) {
     loadStyles();
     return (station.plots = new LivePlots(station));
   }, []);
-  return html`<${Board} plots=${plots} save=${() => plots.save()} notes=${station.drives ? [] : NOT_LIVE} />`;
+  return html`<${Board} plots=${plots} save=${() => plots.keep()} notes=${station.drives ? [] : NOT_LIVE} />`;
 }
 
 /**

@@ -57,6 +57,13 @@ export function Dialog({ children, close, ...others }) {
   return html`<dialog ref=${dialog} onClose=${close} ...${others}>${children}</dialog>`;
 }
 
+/** Let the browser keep a file. @param {string[]} parts its text */
+export function save(parts, name, type = "text/csv") {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob(parts, { type })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
 /** Whether a key that is pressed belongs to what is written in. */
 export function isTyping(event) {
   const target = event.target;

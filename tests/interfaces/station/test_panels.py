@@ -35,5 +35,6 @@ def test_every_symbol_that_is_named_has_an_outline() -> None:
     outlines = set(re.findall(r"^  (\w+): \"", (STATIC / "icons.js").read_text(), re.MULTILINE))
     scripts = "".join(path.read_text() for path in STATIC.glob("*.js"))
     named = set(re.findall(r"""\bicon\("(\w+)"\)""", scripts)) | {panel.icon for panel in PANELS if panel.icon}
+    named |= set(re.findall(r"""<\$\{Icon\} name="(\w+)\"""", scripts))
     assert len(named) > 15
     assert named <= outlines
