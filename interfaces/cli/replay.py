@@ -182,7 +182,7 @@ def _serve(playback: Playback, start: PlaybackStart, access: Access, allowed: Ho
 
     from interfaces.link.proxy import Address
     from interfaces.messages.control import Role
-    from interfaces.recording.page import ReplayPage
+    from interfaces.station.replay_page import ReplayPage
     from interfaces.stream import sockets
     from interfaces.stream.server import application
     from vrs.clock import WallClock

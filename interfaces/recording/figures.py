@@ -125,7 +125,11 @@ def summary(recording: Recording) -> Json:
     Raises:
         FormatError: If the recording has too little of it.
     """
-    found = figures(recording)
+    return summary_of(figures(recording))
+
+
+def summary_of(found: RunFigures | DriveFigures) -> Json:
+    """A summary with what is missing."""
     return found.summary() | ({"missing": list(found.missing)} if found.missing else {})
 
 

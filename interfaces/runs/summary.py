@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from interfaces.runs.twin_run import TwinRun
-from vrs.comparison import Agreement, PathComparison, agreement, best_lag, compare_paths, shifted
+from vrs.comparison import Agreement, PathMatch, agreement, best_lag, match_paths, shifted, summed_up
 from vrs.ledger import Receipt, Status
 from vrs.model import Array, RobotModel
 
@@ -230,8 +230,8 @@ def _errors(value: Agreement, model: RobotModel) -> Json:
     }
 
 
-def _path(run: TwinRun) -> Json:
-    """Tool path and time difference in user time, in the metres and seconds of `docs/summary.md`."""
+def path_match(run: TwinRun) -> tuple[PathMatch, Json]:
+    """The real tool's path matched to the virtual one's in user time, and by which cells [m] and speed [m/s]."""
     samples, gaps = run.at_samples, ~run.measured
     # The virtual robot's path goes on where the real one wasn't measured.
     t = np.concatenate((samples.t, run.t[gaps]))
@@ -242,9 +242,14 @@ def _path(run: TwinRun) -> Json:
     steps = np.linalg.norm(np.diff(p_virtual, axis=0), axis=1)
     cell = max(0.01, float(steps.sum()) / MOST_CELLS)
     v_max = max(0.5, float((steps / np.diff(t[order])).max()))
-    result = compare_paths(t[order], p_virtual, p_real[order], v_max=v_max, cell=cell)
-    names = PathComparison.__slots__
-    return {"cell": cell, "v_max": v_max, **{name: getattr(result, name) for name in names}}
+    match = match_paths(t[order], p_virtual, p_real[order], v_max=v_max, cell=cell)
+    return match, {"cell": cell, "v_max": v_max}
+
+
+def _path(run: TwinRun) -> Json:
+    """Tool path and time difference, in the metres and seconds of `docs/summary.md`."""
+    match, options = path_match(run)
+    return {**options, **asdict(summed_up(match))}
 
 
 def _receipt(receipt: Receipt, model: RobotModel) -> Json:

@@ -42,6 +42,11 @@ def _file(name: str) -> KeptFile:
     return KeptFile.of(resources.files(package).joinpath(f"static/{name}").read_bytes())
 
 
+def station_files() -> Route:
+    """The route of the scripts and styles that pages are made of."""
+    return Route("/station/{name}", _answer)
+
+
 class Station:
     """The page `/` of a robot, and the files below `/station/`."""
 
@@ -60,7 +65,7 @@ class Station:
     @property
     def routes(self) -> list[BaseRoute]:
         """What it answers."""
-        return [Route("/", self._show), Route("/station/{name}", _answer)]
+        return [Route("/", self._show), station_files()]
 
     async def _show(self, request: Request) -> Response:
         return self._page.answer(request, "text/html", HEADERS)

@@ -71,7 +71,7 @@ class Recordings:
             recording: What is recorded of the operator's site.
             clock: Session time.
             shelf: Where recordings are put.
-            access: Who may do what: viewers look, replay and take copies, operators record.
+            access: Who may do what: viewers look, replay and take copies, operators record and delete.
             what: Says what a new recording is, into a file.
         """
         self._recording, self._clock, self._shelf, self._access = recording, clock, shelf, access
@@ -138,7 +138,9 @@ class Recordings:
                 growing = None if recorder is None else recorder.path.name
                 entries, more = await asyncio.to_thread(self._shelf.entries, growing)
                 items = [entry.facts() for entry in entries]
-                told = {"kind": "list", "directory": str(self._shelf.directory), "items": items, "more": more}
+                robot = "" if self._shelf.robot is None else self._shelf.robot.name
+                directory = str(self._shelf.directory)
+                told = {"kind": "list", "robot": robot, "directory": directory, "items": items, "more": more}
                 self._put("list", told)
             self._looking.clear()
             with contextlib.suppress(TimeoutError):
@@ -180,8 +182,10 @@ class Recordings:
                 return {"problem": problem}
             case "copy":
                 return {"path": f"/recordings/copy/{self._ticket(ask.name)}"}
+            case "delete":
+                self.delete(ask.name)
             case _:
-                raise InvalidValueError("do", ask.do, "begin, end or copy")
+                raise InvalidValueError("do", ask.do, "begin, end, copy or delete")
         return {}
 
     async def begin(self, name: str) -> None:
@@ -194,12 +198,32 @@ class Recordings:
         path = self._shelf.place(name)
         await self._recording.begin(self._what(path))
 
-    def _ticket(self, name: str) -> str:
-        """A word by which a recording can be fetched once, soon; it opens nothing else."""
+    def delete(self, name: str) -> None:
+        """Delete a recording; downloads that have begun come to their end.
+
+        Raises:
+            InvalidValueError: If there's none of that name, it's being written or looked at, or can't be deleted.
+        """
+        path = self._ended(name)
+        if not self.replays.let_go(name):
+            raise InvalidValueError("recording", name, "one at which nobody looks: it's played back on a page")
+        try:
+            path.unlink()
+        except OSError as error:
+            raise InvalidValueError("recording", name, f"one that can be deleted ({error.strerror})") from None
+        self._looking.set()
+
+    def _ended(self, name: str) -> Path:
+        """Where a recording is that isn't being written."""
         recorder = self._recording.recorder
         path = self._shelf.path(name)
         if recorder is not None and recorder.path.resolve() == path.resolve():
             raise InvalidValueError("recording", name, "one that has ended: this one is being written")
+        return path
+
+    def _ticket(self, name: str) -> str:
+        """A word by which a recording can be fetched once, soon; it opens nothing else."""
+        path = self._ended(name)
         ticket = secrets.token_urlsafe(18)
         self._tickets[ticket] = path, self._clock.now() + TICKET
         while len(self._tickets) > 2 * SENT_AT_ONCE:

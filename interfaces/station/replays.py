@@ -9,16 +9,19 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from starlette.routing import BaseRoute, WebSocketRoute
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from interfaces.recording.page import BEGIN, MOST_HEARD, ReplayPage, page_files
 from interfaces.recording.playback import Align, Playback
 from interfaces.recording.recording import Recording, open_recording
 from interfaces.recording.stages import prepare
+from interfaces.station.replay_page import BEGIN, MOST_HEARD, ReplayPage, page_files
 from interfaces.station.shelf import LOOKED_INTO, Shelf
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import Viewers
+from interfaces.stream.server import HEADERS
 from robots.robot import Robot
 from vrs.checks import one_of
 from vrs.clock import Clock
@@ -94,6 +97,7 @@ class Replays:
             *page_files(),
             WebSocketRoute("/replay/board", self._serve_board),
             WebSocketRoute("/replay/scene/{index:int}", self._serve_scene),
+            Route("/replay/curves/{index:int}", self._answer_curves),
         ]
 
     @property
@@ -128,14 +132,39 @@ class Replays:
             if replay.task is None and not replay.board.readers:
                 self._forget(replay)
 
-    async def _serve_scene(self, websocket: WebSocket) -> None:
-        index = websocket.path_params["index"]
+    def let_go(self, name: str) -> bool:
+        """Close the play-backs of a recording, unless somebody looks at one; whether it's done."""
+        having = [replay for replay in self.replays.values() if name in replay.key[0]]
+        if any(replay.board.readers for replay in having):
+            return False
+        for replay in having:
+            self._close(replay)
+        return True
+
+    def _close(self, replay: _SharedReplay) -> None:
+        if replay.task is not None:
+            replay.task.cancel()
+        self._forget(replay)
+
+    def _page_of(self, query: Mapping[str, str]) -> ReplayPage | None:
+        """What is open of what a page asks for."""
         with contextlib.suppress(InvalidValueError):
-            replay = self.replays.get(_key(websocket.query_params))
-            if replay is not None and replay.page is not None and index < len(replay.page.viewers):
-                await replay.page.viewers[index].serve(websocket)
-                return
-        await websocket.close()
+            replay = self.replays.get(_key(query))
+            return None if replay is None else replay.page
+        return None
+
+    async def _serve_scene(self, websocket: WebSocket) -> None:
+        index, page = websocket.path_params["index"], self._page_of(websocket.query_params)
+        if page is not None and index < len(page.viewers):
+            await page.viewers[index].serve(websocket)
+        else:
+            await websocket.close()
+
+    async def _answer_curves(self, request: Request) -> Response:
+        page = self._page_of(request.query_params)
+        if page is None:
+            return JSONResponse({"problem": "this play-back isn't open"}, 404, HEADERS)
+        return await page.answer_curves(request)
 
     def replay_for(self, query: Mapping[str, str]) -> _SharedReplay:
         """The play-back that a page's address asks for, made if nobody has asked for it.
@@ -163,9 +192,7 @@ class Replays:
             if not idle:
                 replay.say("failed", f"{MOST} play-backs are open already: close one, then load this page anew")
                 return
-            assert idle[0].task is not None
-            idle[0].task.cancel()
-            self._forget(idle[0])
+            self._close(idle[0])
         if self._running:
             replay.task = asyncio.create_task(self._play(replay))
 

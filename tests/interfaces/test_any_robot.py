@@ -320,7 +320,7 @@ def test_a_base_of_another_size_is_driven_live_seen_on_the_page_and_recorded(tmp
                 time.sleep(0.1)
             assert robot.wait(lambda it: it.postures.real.x > begun + 0.2, 30.0)
             assert not page.get("station.config.panels.some((panel) => panel.name === 'camera')")
-            page.wait("station.shared.record.now?.name === 'live.mcap'")
+            page.wait("station.recordings.now?.name === 'live.mcap'")
         assert page.errors == []
         page.page.context.close()
     told = json.loads(vrs("compare", path, "--robot", BASE, "--json"))

@@ -7,12 +7,12 @@ const KEPT = 200;
 const CLOSE = 0.25;
 const MOST = 40;
 
-/** Kinds of lines across the plots: name, what it means. */
-export const KINDS = [
-  ["begin", "a move begins"],
-  ["corrected", "virtual robot put right"],
-  ["halted", "real robot stopped, or lost"],
-];
+/** Lines across the plots, by what happened: what they mean, colour, dashes. */
+export const ACROSS = {
+  begin: ["a move begins", "--muted", [2, 4]],
+  corrected: ["virtual robot put right", "--committed", []],
+  halted: ["real robot stopped, or lost", "--bad", [6, 3]],
+};
 
 export class Happenings {
   constructor(station) {
@@ -57,7 +57,7 @@ export class Happenings {
       if (start >= from && start - last > CLOSE) begins.push({ t: start, kind: "begin" });
       last = start;
     }
-    const lines = this.events.filter(({ t, kind }) => t >= from && t <= until && KINDS.some(([name]) => name === kind));
+    const lines = this.events.filter(({ t, kind }) => t >= from && t <= until && kind in ACROSS);
     return begins.length > MOST ? lines : [...begins, ...lines];
   }
 }

@@ -1,7 +1,6 @@
 // Plan files (docs/plan-files.md): what is planned, saved to one; and one's moves, given again one after the other.
-import { save } from "./csv.js";
 import { movesBetween } from "./moves.js";
-import { clockText, DEGREES, Dialog, html, useRef, useState } from "./ui.js";
+import { clockText, DEGREES, Dialog, html, save, useRef, useState } from "./ui.js";
 
 /** A plan that is loaded begins so long after it was asked for [s], or after what is planned. */
 const LEAD = 1;

@@ -1,13 +1,13 @@
-// Recording on the fly, and the list of recordings: replayed alone or side by side, and copied.
-import { draw, h, icon, mark, write } from "./dom.js";
+// Recording on the fly, and the list of recordings: replayed alone or side by side, copied, deleted.
 import { sideLink } from "./sidelink.js";
+import { html, Icon, observed, useEffect, useMemo, useRef, useSignal, useState } from "./ui.js";
 
-const ALIGNED = [
-  ["start", "beginnings together"],
-  ["began", "as they happened, by the clock"],
-  ["timeline", "at equal session times"],
-];
+const ALIGNED = { start: "beginnings together", began: "as they happened, by the clock", timeline: "at equal session times" };
 const MOST_CHOSEN = 2;
+const OPEN = ["Choose one or two to replay", "Replay", "Replay side by side"];
+
+const two = (number) => String(number).padStart(2, "0");
+const plain = (name) => name.replace(/\.mcap$/, "");
 
 /** Bytes as people read them. */
 function sizeText(bytes) {
@@ -18,197 +18,177 @@ function sizeText(bytes) {
 /** Seconds as h:mm:ss or m:ss. */
 function lengthText(seconds) {
   const whole = Math.round(seconds);
-  const two = (number) => String(number).padStart(2, "0");
   const [hours, minutes] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60];
-  return (hours ? hours + ":" + two(minutes) : minutes) + ":" + two(whole % 60);
+  return (hours ? `${hours}:${two(minutes)}` : minutes) + ":" + two(whole % 60);
 }
 
 function whenText(seconds) {
   const at = new Date(seconds * 1000);
-  const two = (number) => String(number).padStart(2, "0");
-  const day = `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`;
-  return `${day} ${two(at.getHours())}:${two(at.getMinutes())}`;
+  return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${two(at.getHours())}:${two(at.getMinutes())}`;
 }
 
-/** A name that isn't taken yet, unless two people are very quick. */
-function freshName() {
-  return whenText(Date.now() / 1000).replace(" ", "_").replace(":", ".") + "." + String(new Date().getSeconds()).padStart(2, "0");
-}
+/** When, how long, how large. */
+const factsOf = ({ began, changed, length, size }) =>
+  [whenText(began ?? changed), length === null ? null : lengthText(length), sizeText(size)].filter(Boolean).join(" · ");
 
-export function mount(station, box) {
-  const session = station.session;
-  let now = null; // what is being recorded
-  let items = [];
-  let chosen = []; // names, the first chosen first
-  let busy = false;
+/** What the server records and has, as fields, and what it's asked for. */
+export class Recordings {
+  constructor(station) {
+    this.station = station;
+    // What is being recorded, four times a second; of it what seldom changes: its name, and why it failed.
+    observed(this, { now: null, growing: null, failed: "" });
+    observed(this, { items: [], directory: "", more: 0, robot: "", problem: "", busy: false });
+    sideLink(station, "/recordings/board", {
+      take: (data) => {
+        const { kind, ...told } = JSON.parse(typeof data === "string" ? data : new TextDecoder().decode(data));
+        if (kind === "list") Object.assign(this, told);
+        else if (kind === "recording") Object.assign(this, told, { growing: told.now?.name ?? null, failed: told.now?.problem ?? "" });
+      },
+    });
+  }
 
-  const name = h("input", { id: "record-name", maxlength: 95, spellcheck: "false", autocomplete: "off", "aria-label": "Name of the recording" });
-  const begin = h("button.main", { type: "submit", id: "record-begin" }, icon("fiber_manual_record"), h("span", {}, "Record"));
-  const form = h("form.row", { id: "record-form" }, name, h("span.muted", {}, ".mcap"), begin);
-  const end = h("button", { type: "button", id: "record-end", onclick: finish }, icon("stop"), h("span", {}, "End recording"));
-  const symbol = icon("fiber_manual_record");
-  const what = h("span.what");
-  const facts = h("span.muted");
-  const card = h("div.recording", { id: "recording", hidden: true }, symbol, h("div.grow", {}, what, facts), end);
-  const problem = h("p.refused", { id: "record-problem", hidden: true });
-  const idle = h("p.muted", { id: "record-idle" });
-  const list = h("ul.recordings", { id: "recordings", "aria-label": "Recordings, newest first" });
-  const where = h("p.muted.where");
-  const align = h("select", { id: "record-align", "aria-label": "Side by side, aligned", onchange: showChoice },
-    ...ALIGNED.map(([value, text]) => h("option", { value }, text)));
-  const open = h("a.open", { id: "record-replay", target: "_blank", rel: "opener" }, icon("play_circle"), h("span"));
-  const choice = h("div.choice", {}, align, open);
-  box.append(form, card, idle, problem, h("h2", {}, "Recordings"), list, where, choice);
-  name.value = freshName();
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    start();
-  });
-
-  function complain(text) {
-    problem.hidden = !text;
-    write(problem, text);
-    station.refuse(text);
+  /** A name that isn't taken: the robot, and the time here. */
+  get freshName() {
+    const robot = this.robot.replace(/[^\w.+-]/g, "-").replace(/^[^A-Za-z0-9]+/, "") || "recording";
+    const name = `${robot} ${whenText(Date.now() / 1000).replace(":", ".")}`;
+    const taken = (one) => this.items.some((item) => item.name === `${one}.mcap`);
+    let [fresh, number] = [name, 2];
+    while (taken(fresh)) fresh = `${name} (${number++})`;
+    return fresh;
   }
 
   /** Ask the server; what it answers, or null where it doesn't do it. */
-  async function ask(request) {
-    const headers = { "Content-Type": "application/json" };
-    if (session.token) headers.Authorization = "Bearer " + session.token;
-    busy = true;
-    showState();
+  async ask(what, name) {
+    const { token } = this.station.session;
+    const headers = { "Content-Type": "application/json", ...(token && { Authorization: "Bearer " + token }) };
+    this.busy = true;
     try {
-      const answer = await fetch(window.VrsLink.FOLDER + "/recordings", { method: "POST", headers, body: JSON.stringify(request) });
+      const body = JSON.stringify({ do: what, ...(name && { name }) });
+      const answer = await fetch(window.VrsLink.FOLDER + "/recordings", { method: "POST", headers, body });
       const found = await answer.json();
-      complain(found.problem ?? "");
+      this.complain(found.problem ?? "");
       return answer.ok ? found : null;
     } catch {
-      complain("The server doesn't answer: nothing was done.");
+      this.complain("The server doesn't answer: nothing was done.");
       return null;
     } finally {
-      busy = false;
-      showState();
+      this.busy = false;
     }
   }
 
-  async function start() {
-    const given = name.value.trim().replace(/\.mcap$/, "");
-    if (!given) return complain("The recording needs a name.");
-    if (await ask({ do: "begin", name: given + ".mcap" })) station.announce("Recording " + given);
+  complain(text) {
+    this.problem = text;
+    this.station.refuse(text);
   }
 
-  async function finish() {
-    const ended = now?.name;
-    if (await ask({ do: "end" })) {
-      name.value = freshName();
-      station.announce("Recording ended: " + ended);
-    }
+  async end() {
+    const name = this.growing;
+    if (await this.ask("end")) this.station.announce("Recording ended: " + name);
   }
 
-  async function copy(item) {
-    const found = await ask({ do: "copy", name: item.name });
-    if (found) h("a", { href: window.VrsLink.FOLDER + found.path, download: item.name }).click();
+  async copy(name) {
+    const found = await this.ask("copy", name);
+    if (!found) return;
+    const link = Object.assign(document.createElement("a"), { href: window.VrsLink.FOLDER + found.path, download: name });
+    link.click();
   }
 
-  let told = "";
-  function showState() {
-    const may = session.mayCommand;
-    const tab = document.getElementById("tab-record");
-    mark(tab, "data-recording", now ? (now.problem ? "failed" : "yes") : null);
-    form.hidden = Boolean(now) || !may;
-    card.hidden = !now;
-    idle.hidden = Boolean(now) || may;
-    write(idle, "Nothing is being recorded. Operators can begin.");
-    begin.disabled = end.disabled = busy;
-    end.hidden = !may;
-    const failed = now?.problem ?? "";
-    if (failed !== told) {
-      told = failed;
-      if (failed) station.announce(failed, { urgent: true });
-    }
-    if (!now || box.offsetParent === null) return;
-    mark(card, "data-failed", Boolean(failed));
-    draw(symbol, failed ? "error" : "fiber_manual_record");
-    write(what, failed ? "Not recording" : "Recording " + now.name);
-    const dropped = now.dropped ? ` · ${now.dropped} messages left out: the disk is slow` : "";
-    write(facts, failed || `since ${lengthText(now.length)} · ${sizeText(now.size)}${dropped}`);
-    write(end.lastChild, failed ? "Put it away" : "End");
+  async delete(name) {
+    if (await this.ask("delete", name)) this.station.announce(`${plain(name)} is deleted`);
+  }
+}
+
+export function Panel({ station }) {
+  const recordings = useMemo(() => (station.recordings = new Recordings(station)), []);
+  const { growing, failed, items, directory, more, problem } = recordings;
+  const [chosen, setChosen] = useState([]); // names, the first chosen first
+  const [doomed, setDoomed] = useState(null);
+  const may = station.session.mayCommand;
+  const there = chosen.filter((one) => items.some(({ name, playable }) => name === one && playable));
+
+  useEffect(() => {
+    const { dataset } = document.getElementById("tab-record");
+    if (growing) dataset.recording = failed ? "failed" : "yes";
+    else delete dataset.recording;
+    if (failed) station.announce(failed, { urgent: true });
+  }, [growing, failed]);
+
+  const choose = (name) => setChosen(there.includes(name) ? there.filter((one) => one !== name) : [...there, name].slice(-MOST_CHOSEN));
+  const letter = (name) => (there.includes(name) ? (there.length > 1 ? "AB"[there.indexOf(name)] : "✓") : "");
+  return html`
+    ${growing ? html`<${Now} recordings=${recordings} may=${may} />` : may && html`<${Begin} recordings=${recordings} />`}
+    <p class="muted" id="record-idle" hidden=${Boolean(growing) || may}>Nothing is being recorded. Operators can begin.</p>
+    <p class="refused" id="record-problem" hidden=${!problem}>${problem}</p>
+    <h2>Recordings</h2>
+    <ul class="recordings" id="recordings" aria-label="Recordings, newest first">${items.map((item) => html`<${Row} key=${item.name} item=${item}
+      growing=${growing === item.name} letter=${letter(item.name)} choose=${choose} copy=${() => recordings.copy(item.name)}
+      drop=${may && (() => setDoomed(item))} />`)}</ul>
+    ${doomed && html`<${Deletion} key=${doomed.name} item=${doomed} drop=${() => recordings.delete(doomed.name)} close=${() => setDoomed(null)} />`}
+    <p class="muted where">${directory && (items.length ? `In ${directory}${more ? `, and ${more} older ones` : ""}` : `None yet in ${directory}`)}</p>
+    <${Choice} chosen=${there} />`;
+}
+
+/** A name, shown before it begins, and the button that begins. */
+function Begin({ recordings }) {
+  const given = useSignal(null);
+
+  async function begin(event) {
+    event.preventDefault();
+    const name = plain(event.target.elements["record-name"].value.trim());
+    if (!name) return recordings.complain("The recording needs a name.");
+    if (await recordings.ask("begin", name + ".mcap")) recordings.station.announce("Recording " + name);
   }
 
-  function row(item) {
-    const [title, facts, wrong] = [h("span.name"), h("span.muted"), h("span.wrong")];
-    const pick = h("button.pick", { type: "button", "aria-pressed": "false", onclick: () => choose(item.name) },
-      h("span.letter", { "aria-hidden": "true" }), h("span.about", {}, title, facts, wrong));
-    const get = h("button.quiet", { type: "button", onclick: () => copy(item), "aria-label": "Download " + item.name, title: "Download" },
-      icon("download"));
-    const growing = now?.name === item.name;
-    write(title, item.name.replace(/\.mcap$/, ""));
-    const length = item.length === null ? null : lengthText(item.length);
-    write(facts, [whenText(item.began ?? item.changed), length, sizeText(item.size)].filter(Boolean).join(" · "));
-    write(wrong, growing ? "being recorded" : item.problem);
-    mark(wrong, "data-growing", growing);
-    pick.disabled = !item.playable;
-    get.disabled = growing;
-    return h("li", { "data-name": item.name }, pick, get);
-  }
+  return html`<form class="row" id="record-form" onSubmit=${begin}>
+    <input id="record-name" maxlength="95" spellcheck="false" autocomplete="off" aria-label="Name of the recording"
+      value=${given.value ?? recordings.freshName} onInput=${({ target }) => (given.value = target.value)} />
+    <span class="muted">.mcap</span>
+    <button class="main" type="submit" id="record-begin" disabled=${recordings.busy}><${Icon} name="fiber_manual_record" /><span>Record</span></button></form>`;
+}
 
-  function choose(which) {
-    chosen = chosen.includes(which) ? chosen.filter((one) => one !== which) : [...chosen, which].slice(-MOST_CHOSEN);
-    showChoice();
-  }
+/** What is being recorded. */
+function Now({ recordings, may }) {
+  const { name, length, size, dropped, problem } = recordings.now;
+  const left = dropped ? ` · ${dropped} messages left out: the disk is slow` : "";
+  return html`<div class="recording" id="recording" data-failed=${problem ? "" : null}>
+    <${Icon} name=${problem ? "error" : "fiber_manual_record"} />
+    <div class="grow"><span class="what">${problem ? "Not recording" : `Recording ${name}`}</span>
+      <span class="muted">${problem || `since ${lengthText(length)} · ${sizeText(size)}${left}`}</span></div>
+    <button type="button" id="record-end" hidden=${!may} disabled=${recordings.busy} onClick=${() => recordings.end()}>
+      <${Icon} name="stop" /><span>${problem ? "Put it away" : "End"}</span></button></div>`;
+}
 
-  function showChoice() {
-    for (const element of list.children) {
-      const place = chosen.indexOf(element.dataset.name);
-      mark(element.firstChild, "aria-pressed", place >= 0);
-      write(element.querySelector(".letter"), place < 0 ? "" : chosen.length > 1 ? "AB"[place] : "✓");
-    }
-    align.hidden = chosen.length < 2;
-    mark(open, "aria-disabled", chosen.length === 0 ? "true" : null);
-    write(open.lastChild, ["Choose one or two to replay", "Replay", "Replay side by side"][chosen.length]);
-    if (chosen.length === 0) return open.removeAttribute("href");
-    const query = new URLSearchParams({ a: chosen[0] });
-    if (chosen.length > 1) {
-      query.set("b", chosen[1]);
-      query.set("align", align.value);
-    }
-    mark(open, "href", window.VrsLink.FOLDER + "/replay?" + query);
-  }
+function Row({ item, growing, letter, choose, copy, drop }) {
+  const { name, playable, problem } = item;
+  return html`<li data-name=${name}>
+    <button class="pick" type="button" aria-pressed=${String(Boolean(letter))} disabled=${!playable} onClick=${() => choose(name)}>
+      <span class="letter" aria-hidden="true">${letter}</span>
+      <span class="about"><span class="name">${plain(name)}</span><span class="muted">${factsOf(item)}</span>
+        <span class="wrong" data-growing=${growing ? "" : null}>${growing ? "being recorded" : problem}</span></span></button>
+    <button class="quiet" type="button" disabled=${growing} onClick=${copy} aria-label=${`Download ${name}`} title="Download"><${Icon} name="download" /></button>
+    ${drop && html`<button class="quiet" type="button" disabled=${growing} onClick=${drop} aria-label=${`Delete ${name}`} title="Delete"><${Icon} name="delete" /></button>`}
+  </li>`;
+}
 
-  let drawn = "";
-  function showList() {
-    if (box.offsetParent === null) return;
-    const key = JSON.stringify([items, now?.name]);
-    if (key === drawn) return;
-    drawn = key;
-    const focused = document.activeElement?.closest?.(".recordings li")?.dataset.name;
-    chosen = chosen.filter((one) => items.some((item) => item.name === one && item.playable));
-    list.replaceChildren(...items.map(row));
-    showChoice();
-    const again = [...list.children].find((element) => element.dataset.name === focused);
-    if (again) again.firstChild.focus();
-  }
+/** What is replayed of those that are chosen. */
+function Choice({ chosen }) {
+  const [align, setAlign] = useState("start");
+  const query = new URLSearchParams({ a: chosen[0], ...(chosen.length > 1 && { b: chosen[1], align }) });
+  return html`<div class="choice">
+    <select id="record-align" aria-label="Side by side, aligned" hidden=${chosen.length < 2} value=${align} onChange=${({ target }) => setAlign(target.value)}>
+      ${Object.entries(ALIGNED).map(([value, text]) => html`<option value=${value}>${text}</option>`)}</select>
+    <a class="open" id="record-replay" target="_blank" rel="opener" aria-disabled=${chosen.length ? null : "true"}
+      href=${chosen.length ? `${window.VrsLink.FOLDER}/replay?${query}` : null}><${Icon} name="play_circle" /><span>${OPEN[chosen.length]}</span></a></div>`;
+}
 
-  sideLink(station, "/recordings/board", {
-    take(data) {
-      const message = JSON.parse(typeof data === "string" ? data : new TextDecoder().decode(data));
-      if (message.kind === "recording") now = message.now;
-      else if (message.kind === "list") {
-        items = message.items;
-        const more = message.more ? `, and ${message.more} older ones` : "";
-        write(where, items.length ? `In ${message.directory}${more}` : `None yet in ${message.directory}`);
-      }
-      showState();
-      showList();
-    },
-  });
-  // Draws what has come while the panel was hidden.
-  new IntersectionObserver(() => {
-    showState();
-    showList();
-  }).observe(box);
-  station.on("welcome", showState);
-  station.shared.record = { get now() { return now; }, get items() { return items; } };
-  showState();
-  showChoice();
+/** Asks before a recording is lost; beside the list, so that STOP stays within reach. */
+function Deletion({ item, drop, close }) {
+  const keep = useRef(null);
+  useEffect(() => keep.current.focus(), []);
+  return html`<div class="deletion" role="alertdialog" aria-label="Delete a recording" onKeyDown=${({ key }) => key === "Escape" && close()}>
+    <p>Delete <b>${plain(item.name)}</b>? The file (${factsOf(item)}) is lost for everybody, and can't be brought back.</p>
+    <div class="row">
+      <button type="button" id="record-delete-yes" onClick=${() => (drop(), close())}>Delete it</button>
+      <button type="button" ref=${keep} onClick=${close}>Keep it</button>
+    </div></div>`;
 }

@@ -66,6 +66,13 @@ export function Choice({ label, options, choose, ...others }) {
 /** Of a control: that it can't work now and why, "" where it can, and what else it's titled. */
 export const barred = (why, title) => ({ "aria-disabled": why ? "true" : undefined, title: why || title });
 
+/** Let the browser keep a file. @param {string[]} parts its text */
+export function save(parts, name, type = "text/csv") {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob(parts, { type })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
 /** Whether a key that is pressed belongs to what is written in. */
 export function isTyping(event) {
   const target = event.target;

@@ -14,9 +14,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from interfaces.clients.playhead import Mode
-from interfaces.recording.page import CELLS, ReplayPage, grouped
 from interfaces.recording.playback import Playback
 from interfaces.recording.recording import open_recording
+from interfaces.station.replay_page import CELLS, ReplayPage, grouped
 from interfaces.stream import sockets
 from interfaces.stream.access import hosts
 from interfaces.stream.server import application
@@ -324,9 +324,9 @@ def test_files_are_served_with_care(files):
         names = (
             "",
             "/replay",
-            "/replay/replay.js",
-            "/replay/seekbar.js",
-            "/replay/controls.js",
+            "/station/replay.js",
+            "/station/seekbar.js",
+            "/station/controls.js",
             "/replay/replay.css",
             "/replay/scene.js",
             "/replay/licences.txt",

@@ -113,7 +113,7 @@ def test_the_way_is_changed_on_the_fly_and_plots_are_drawn(page: Page) -> None:
     page.page.fill("#net-delay-forward", "constant:0.2")
     page.page.click("#net-apply")
     page.wait("station.session.network?.forward.delay === 'constant:0.2'")
-    page.page.click("#tab-deviation")
+    page.page.click("#tab-plots")
     page.page.keyboard.down("ArrowUp")
     page.wait("station.session.state.time_difference > 0.25", 30.0)
     page.wait("document.querySelectorAll('.plot-area canvas').length >= 3")
@@ -122,7 +122,7 @@ def test_the_way_is_changed_on_the_fly_and_plots_are_drawn(page: Page) -> None:
     page.shoot("drive-plots")
     for scheme in ("light", "dark"):
         page.page.emulate_media(color_scheme=scheme)
-        for tab in ("drive", "camera", "deviation", "network"):
+        for tab in ("drive", "camera", "plots", "network"):
             page.page.click(f"#tab-{tab}")
             found = Axe().run(page.page)["violations"]
             grave = [fault["id"] for fault in found if fault["impact"] in ("serious", "critical")]

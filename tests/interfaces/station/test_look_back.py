@@ -57,7 +57,7 @@ def test_what_is_driven_is_looked_back_at_while_it_is_recorded(browser: Any, tmp
         rest(page)
         rested = page.get("station.session.state.now")
         page.page.click("#tab-record")
-        page.wait("station.shared.record.now?.name === 'drive.mcap' && station.shared.record.now.problem === null")
+        page.wait("station.recordings.now?.name === 'drive.mcap' && station.recordings.now.problem === null")
         page.page.locator("li[data-name='drive.mcap'] .pick").press("Enter")
         shown = replayed(page)
         end = time.monotonic() + PATIENCE
@@ -84,7 +84,7 @@ def test_what_is_driven_is_looked_back_at_while_it_is_recorded(browser: Any, tmp
         assert drawn(shown, "virtual") == seen[rested][0]
         shown.close()
         page.page.click("#record-end")
-        page.wait("station.shared.record.now === null")
+        page.wait("station.recordings.now === null")
     with open_recording(path) as recording:
         assert recording.end is not None
         assert not recording.damage

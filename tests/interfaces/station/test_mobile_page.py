@@ -14,9 +14,9 @@ from tests.interfaces.station.test_notices import told
 SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
 OWNERS = {
     "camera.css": ["camera"],
-    "driving.css": ["drive", "deviation", "floor"],
+    "driving.css": ["drive", "plots", "floor"],
     "tasks.css": ["map", "jobs"],
-    "plots.css": ["deviation"],
+    "plots.css": ["plots"],
 }
 """The panels that each style sheet is for, beside the page's own."""
 LEAKS = """(owners) => [...document.styleSheets].flatMap((sheet) => {

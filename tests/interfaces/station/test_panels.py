@@ -13,7 +13,7 @@ from vrs.errors import InvalidValueError
 
 ARM = """pane drag link control theme hints stop jog receipts plots terminal network record strip"""
 STATIC = Path(interfaces.station.__file__).parent / "static"
-BASE = """floor link control theme hints stop drive map jobs camera deviation network record"""
+BASE = """floor link control theme hints stop drive map jobs camera plots network record"""
 
 
 def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:
@@ -21,7 +21,7 @@ def test_a_page_has_the_panels_of_what_its_server_offers_in_one_order() -> None:
     everything = {Offer.ARCS, Offer.JOBS, Offer.CAMERA, Offer.RECORDINGS}
     assert [p.name for p in panels_of(everything)] == BASE.split()
     bare = {p.name for p in panels_of({Offer.ARCS})}
-    assert {"floor", "drive", "deviation"} <= bare
+    assert {"floor", "drive", "plots"} <= bare
     assert not bare & {"map", "jobs", "camera", "record"}
 
 
@@ -35,5 +35,6 @@ def test_every_symbol_that_is_named_has_an_outline() -> None:
     outlines = set(re.findall(r"^  (\w+): \"", (STATIC / "icons.js").read_text(), re.MULTILINE))
     scripts = "".join(path.read_text() for path in STATIC.glob("*.js"))
     named = set(re.findall(r"""\bicon\("(\w+)"\)""", scripts)) | {panel.icon for panel in PANELS if panel.icon}
+    named |= set(re.findall(r"""<\$\{Icon\} name="(\w+)\"""", scripts))
     assert len(named) > 15
     assert named <= outlines

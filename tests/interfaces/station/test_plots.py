@@ -22,7 +22,7 @@ from vrs.comparison import agreement, compare_paths
 from vrs.timeline import Timeline
 
 MODEL = puma560.model()
-PLOTS = "station.shared.plots"
+PLOTS = "station.plots"
 ROWS = f"""(() => {{ const {{ table }} = {PLOTS}.samples;
     return Object.fromEntries(table.names.map((name) => [name, [...table.column(name)]])); }})()"""
 RNG_SEED = 11
@@ -243,9 +243,9 @@ def test_time_difference_and_path_error_are_those_of_the_comparison(page: Page, 
 def test_plots_say_what_they_show_and_look_back(page: Page, tmp_path: Path) -> None:
     move(page)
     page.page.click("#plot-figures > summary")
-    page.wait(f"{PLOTS}.paths?.mean != null")
+    page.wait(f"{PLOTS}.samples.compared?.time_difference_mean != null")
     # The adaptive offset hides the delay, with some 50 ms to spare.
-    difference = page.get(f"{PLOTS}.paths.mean")
+    difference = page.get(f"{PLOTS}.samples.compared.time_difference_mean")
     behind = np.nanmean(-np.array(page.get(f"[...{PLOTS}.samples.table.column('D')]"), float))
     assert difference == pytest.approx(behind, abs=0.15)
     delays = page.get(f"[...{PLOTS}.samples.arrived.column('delay')]")
@@ -308,6 +308,7 @@ SEEN = """async (changes) => {
     };
     try {
         const chart = new Chart({ name: "of-a-test", title: "", unit: "", open: true, note: "", lines: [] });
+        chart.attach(document.createElement("div"));
         tell(changes.map((isIntersecting) => ({ isIntersecting })));
         return chart.visible;
     } finally {

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from axe_core_python.sync_playwright import Axe
+from websockets.sync.client import connect
 
 from interfaces.cli.main import exit_status
 from interfaces.messages.control import Role
@@ -26,7 +27,8 @@ from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import SERVE, Page, paged, station, until
 
 MODEL = puma560.model()
-NOW = "station.shared.record.now"
+LIVE = Path(__file__).parents[2] / "contract/data/recordings/live.mcap"
+NOW = "station.recordings.now"
 POSES = """([k, twin]) => [0, 1, 2, 3, 4, 5, 6].map((i) => {
     const node = replay.node(k, 'vrs', twin, 'body', String(i));
     node.updateMatrix();
@@ -112,7 +114,7 @@ def record(page: Page, name: str, *poses: str) -> None:
         to(page, pose)
     page.page.click("#record-end")
     page.wait(f"{NOW} === null")
-    page.wait(f"station.shared.record.items.some((item) => item.name === '{name}.mcap' && item.length > 0)")
+    page.wait(f"station.recordings.items.some((item) => item.name === '{name}.mcap' && item.length > 0)")
 
 
 @pytest.fixture(scope="module")
@@ -146,8 +148,8 @@ def test_a_recording_begun_late_holds_all_that_compare_needs(recorded: tuple[Pat
 
 def replayed(page: Page, *names: str) -> Any:
     """Choose recordings and open their page."""
-    for button in page.page.locator(".pick[aria-pressed=true]").all():
-        button.click()
+    while (pressed := page.page.locator(".pick[aria-pressed=true]")).count():
+        pressed.first.click()
     for name in names:
         page.page.locator(f"li[data-name='{name}.mcap'] .pick").press("Enter")
     with page.page.context.expect_page() as opened:
@@ -231,7 +233,7 @@ def test_wrong_names_and_rights_are_refused_with_one_message(page: Page, served:
         "a\0.mcap",
     )
     for name in names:
-        for do in ("begin", "copy"):
+        for do in ("begin", "copy", "delete"):
             status, answer = served.ask({"do": do, "name": name})
             assert status == 400, name
             assert "plain file name" in answer["problem"]
@@ -287,7 +289,7 @@ def test_one_who_watches_sees_it_and_may_replay(browser: Any, served: Served) ->
         assert second.page.locator("#record-end").is_hidden()
         assert served.ask({"do": "begin", "name": "another.mcap"})[0] == 400
         # What is being recorded is followed live.
-        second.wait("station.shared.record.items.some((item) => item.name === 'watched.mcap')")
+        second.wait("station.recordings.items.some((item) => item.name === 'watched.mcap')")
         shown = replayed(second, "watched")
         until(lambda: shown.evaluate("replay.state.mode === 'live'"))
         assert served.ask({"do": "copy", "name": "watched.mcap"})[0] == 400
@@ -303,6 +305,57 @@ def test_one_who_watches_sees_it_and_may_replay(browser: Any, served: Served) ->
     assert again.value.code == 404
 
 
+def test_a_name_is_offered_that_is_the_robots_and_not_taken(page: Page) -> None:
+    pattern = "/^puma560 [-0-9]{10} [0-9]{2}[.][0-9]{2}$/"
+    page.wait(f"{NOW} === null && {pattern}.test(document.getElementById('record-name').value)")
+    offered = page.page.locator("#record-name").input_value()
+    page.page.click("#record-begin")
+    page.wait(f"{NOW}?.name === '{offered}.mcap'")
+    page.page.click("#record-end")
+    page.wait(f"{NOW} === null && station.recordings.items.some((item) => item.name === '{offered}.mcap')")
+    page.wait(f"document.getElementById('record-name').value !== '{offered}'")
+    page.refused = True
+    page.page.fill("#record-name", "a/b")
+    page.page.click("#record-begin")
+    page.wait("document.getElementById('record-problem').textContent.includes('plain file name of letters')")
+    assert page.page.locator("#record-name").input_value() == "a/b"
+
+
+def test_a_recording_is_deleted_by_those_who_record_and_while_nobody_needs_it(page: Page, served: Served) -> None:
+    data = LIVE.read_bytes()
+    assert served.ask({"do": "begin", "name": "growing.mcap"}) == (200, {})
+    doomed = served.directory / "doomed.mcap"
+    doomed.write_bytes(data)
+    request = {"do": "delete", "name": "doomed.mcap"}
+    assert served.ask(request, Role.VIEWER) == (403, {"problem": "this token isn't one for the role operator"})
+    assert served.ask({"do": "delete", "name": "nothing.mcap"})[0] == 400
+    status, answer = served.ask({"do": "delete", "name": "growing.mcap"})
+    assert (status, "this one is being written" in answer["problem"]) == (400, True)
+    assert served.ask({"do": "end"})[0] == 200
+    page.wait("station.recordings.items.some((item) => item.name === 'doomed.mcap' && item.length > 0)")
+    board = station(served.server).replace("http", "ws", 1) + "replay/board?a=doomed.mcap"
+    with connect(board, max_size=2**24, open_timeout=60) as looking:
+        looking.send(json.dumps({"token": served.tokens[Role.VIEWER]}))
+        looking.recv(timeout=60)
+        status, answer = served.ask(request)
+        assert (status, "nobody looks" in answer["problem"]) == (400, True)
+    until(lambda: served.ask(request)[0] == 200)
+    assert not doomed.exists()
+    page.wait("station.recordings.items.every((item) => item.name !== 'doomed.mcap')")
+    doomed.write_bytes(data)
+    page.wait("station.recordings.items.some((item) => item.name === 'doomed.mcap')")
+    button = page.page.locator("[aria-label='Delete doomed.mcap']")
+    button.click()
+    asked = page.page.locator(".deletion")
+    assert "lost for everybody" in (asked.text_content() or "")
+    asked.locator("button", has_text="Keep it").click()
+    assert doomed.exists()
+    button.click()
+    page.page.click("#record-delete-yes")
+    page.wait("station.recordings.items.every((item) => item.name !== 'doomed.mcap')")
+    assert not doomed.exists()
+
+
 @pytest.mark.parametrize(("scheme", "width", "height"), [("light", 1280, 720), ("dark", 1920, 1080)])
 def test_everyone_can_use_it(
     browser: Any, served: Served, recorded: Any, scheme: str, width: int, height: int
@@ -312,7 +365,7 @@ def test_everyone_can_use_it(
     options = {"viewport": {"width": width, "height": height}, "color_scheme": scheme}
     with paged(browser, station(served.server), **options) as opened:
         enter(opened, served, Role.OPERATOR)
-        opened.wait("station.shared.record.items.some((item) => item.problem.startsWith('cut'))")
+        opened.wait("station.recordings.items.some((item) => item.problem.startsWith('cut'))")
         for name in ("first", "second one"):
             opened.page.click(f"li[data-name='{name}.mcap'] .pick")
         found = Axe().run(opened.page)["violations"]

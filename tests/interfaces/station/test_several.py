@@ -92,9 +92,9 @@ def test_a_page_of_each_robot_shows_both_and_moves_its_own(browser: Any, server:
         arm.shoot("several-arm")
         base.shoot("several-base")
         base.page.click("#tab-record")
-        base.wait("station.shared.record.now?.name === 'run-ipr.mcap'")
+        base.wait("station.recordings.now?.name === 'run-ipr.mcap'")
         base.page.click("#record-end")
-        base.wait("station.shared.record.now === null")
+        base.wait("station.recordings.now === null")
 
 
 def test_programs_choose_the_robot_and_share_the_clock(server: Child, folder: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 from starlette.requests import Request
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
 from interfaces.clients.playhead import Mode
@@ -20,6 +20,9 @@ from interfaces.recording.marks import Mark, MarkKind
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
 from interfaces.recording.recording import shows
 from interfaces.recording.stages import Stage
+from interfaces.station.curves import curves
+from interfaces.station.page import station_files
+from interfaces.stream.access import bearer
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import HEADERS, Viewers, files
 from vrs.clock import Clock
@@ -46,8 +49,8 @@ BEGIN: Final = b'{"kind":"begin"}'
 
 
 def page_files() -> list[BaseRoute]:
-    """The routes of the page and its files."""
-    return files("replay", "interfaces.recording", ("seekbar.js", "controls.js"))
+    """The routes of the page, of its style, and of what its 3D view needs; its scripts are the station's."""
+    return files("replay", "interfaces.station")
 
 
 class _Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -97,12 +100,18 @@ class ReplayPage:
         self._marked = float("-inf")
         self._versions: list[tuple[int, tuple[float, float]] | None] = [None] * len(playback.tracks)
         self._put("recordings", {"kind": "recordings", "items": _recordings(playback)})
+        self._authorize = authorize
+        self._curves: dict[int, tuple[float, asyncio.Task[bytes]]] = {}
+        """Of each recording: up to when [s], and what is plotted of it."""
+        self._computing = asyncio.Lock()
         self.viewers = tuple(Viewers(scene, authorize) for scene in self.scenes)
         """Of each scene."""
         board_viewers = Viewers(self.board, authorize, hear=self.hear, most_heard=MOST_HEARD)
         self.routes: list[BaseRoute] = [
             Route("/", _to_page),
             *page_files(),
+            station_files(),
+            Route("/replay/curves/{index:int}", self.answer_curves),
             WebSocketRoute("/replay/board", board_viewers.serve),
             *(
                 WebSocketRoute(f"/replay/scene/{index}", viewers.serve)
@@ -120,6 +129,27 @@ class ReplayPage:
         finally:
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
+
+    async def answer_curves(self, request: Request) -> Response:
+        """What is plotted of a recording, as JSON."""
+        index = request.path_params["index"]
+        if self._authorize is not None and not self._authorize(bearer(request.headers.get("authorization", ""))):
+            return JSONResponse({"problem": "a token that is valid here, please"}, 403, HEADERS)
+        if index >= len(self.playback.tracks):
+            return JSONResponse({"problem": "there's no such recording here"}, 404, HEADERS)
+        end = self.playback.tracks[index].span[1]
+        known = self._curves.get(index)
+        if known is None or known[0] != end:
+            known = self._curves[index] = end, asyncio.create_task(self._plotted(index))
+        try:
+            return Response(await asyncio.shield(known[1]), 200, HEADERS, "application/json")
+        except VrsError as error:
+            return JSONResponse({"problem": str(error)}, 409, HEADERS)
+
+    async def _plotted(self, index: int) -> bytes:
+        track = self.playback.tracks[index]
+        async with self._computing:
+            return await asyncio.to_thread(curves, track.recording.path, track.recording.robot, track.shift)
 
     async def _run(self) -> None:
         while True:
