@@ -34,7 +34,7 @@ def test_every_panel_can_be_had_and_its_name_is_a_files() -> None:
 def test_every_symbol_that_is_named_has_an_outline() -> None:
     outlines = set(re.findall(r"^  (\w+): \"", (STATIC / "icons.js").read_text(), re.MULTILINE))
     scripts = "".join(path.read_text() for path in STATIC.glob("*.js"))
-    named = set(re.findall(r"""\bicon\("(\w+)"\)""", scripts)) | {panel.icon for panel in PANELS if panel.icon}
-    named |= set(re.findall(r"""<\$\{Icon\} name="(\w+)\"""", scripts))
+    called = re.findall(r"""(?:\bicon\(|\$\{Icon\} name=|\bicon=)"(\w+)\"""", scripts)
+    named = set(called) | {panel.icon for panel in PANELS if panel.icon}
     assert len(named) > 15
     assert named <= outlines
