@@ -184,7 +184,9 @@ class Pupil:
     async def follow(self) -> None:
         """Follow frames, and know the clock."""
         await self.send({"type": "follow", "number": 1, "form": "frames", "rate": RATE})
-        for number in range(1, 9):
+        # Clocks are compared when everybody has come in.
+        await asyncio.sleep(0.5)
+        for number in range(1, 17):
             await self.send({"type": "ping", "number": number, "t": time.monotonic()})
             await asyncio.sleep(0.01)
 

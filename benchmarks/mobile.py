@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 import os
 import statistics
+import subprocess
+import sys
 import time
+from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -20,7 +23,7 @@ from robots.mobile.chassis import Senses, SonarModel
 from robots.mobile.robot import BareBody, MobileRobot
 
 if TYPE_CHECKING:
-    from benchmarks.results import Part
+    from benchmarks.results import Part, Result
 
 PERIODS = 10
 """Control periods of 0.1 s a block."""
@@ -94,19 +97,80 @@ def whole_runs(length: float = 60.0, rounds: int = 3) -> dict[str, float]:
     }
 
 
+EARLIER = os.environ.get("VRS_LAB_BESIDE", "")
+"""Another checkout that runs take turns with, as one of commit 6c55945, from before the laboratory drove the sites
+that run live; empty for none."""
+WORKER = """
+import sys, time
+from interfaces.lab.driving.sweep import cases, measure
+from interfaces.teleop.architectures import Transport
+chosen = cases(["timeline"], [Transport.DATAGRAMS], ["mon@3.3"], ["bare"], ["mixed"], range(64), 120.0)
+for line in sys.stdin:
+    start = time.process_time()
+    measure(chosen[int(line)])
+    print(time.process_time() - start, flush=True)
+"""
+"""What runs laboratory runs of 120 s, by their seeds, and says what each took in processor time [s]."""
+
+
+def beside(earlier: str, rounds: int = 20) -> tuple[list[float], list[float]]:
+    """What runs take here and by another checkout, in turns, seed by seed [s]."""
+    with ExitStack() as stack:
+        pair = []
+        for folder in (os.getcwd(), earlier):
+            process = stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-c", WORKER],
+                    cwd=folder,
+                    env=os.environ | {"PYTHONPATH": folder},
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+            )
+            pair.append(process)
+
+        def took(process: subprocess.Popen[str], seed: int) -> float:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            process.stdin.write(f"{seed}\n")
+            process.stdin.flush()
+            return float(process.stdout.readline())
+
+        costs = [[took(process, seed) for process in pair] for seed in range(rounds + 1)]
+    ours, theirs = map(list, zip(*costs[1:], strict=True))
+    return ours, theirs
+
+
 def many_runs(count: int, length: float = 120.0) -> float:
     """Seconds by the clock that laboratory runs take on two workers, with metrics."""
-    from interfaces.lab.driving.sweep import cases, measure, sweep
+    from interfaces.lab.driving.sweep import cases, measure
+    from interfaces.lab.runner import pooled
     from interfaces.teleop.architectures import Transport
 
     chosen = cases(["timeline"], [Transport.DATAGRAMS], ["mon@3.3"], ["bare"], ["mixed"], range(count), length)
     start = time.perf_counter()
-    sweep(chosen, measure, workers=2)
+    pooled([(measure, (case,)) for case in chosen], workers=2)
     return time.perf_counter() - start
 
 
 RUNS = int(os.environ.get("VRS_LAB_RUNS", "40"))
 """How many runs are timed on two workers; the bar is for 1,000."""
+
+
+def _beside(earlier: str) -> Result:
+    from benchmarks.results import Bar, Cost, Result
+
+    ours, theirs = beside(earlier)
+    ratio = statistics.median(b / a for a, b in zip(ours, theirs, strict=True))
+    return Result(
+        "a run of 120 s",
+        Cost(1e6 * statistics.median(ours)),
+        bar=Bar(ratio=0.91),
+        peer="another checkout",
+        theirs=Cost(1e6 * statistics.median(theirs)),
+        ratio=ratio,
+    )
 
 
 def part() -> Part:
@@ -140,5 +204,6 @@ def part() -> Part:
                 bar=Bar(median=0.24e6),
                 note=f"{seconds * 1000 / RUNS:.0f} s for 1,000",
             ),
+            *((_beside(EARLIER),) if EARLIER else ()),
         ),
     )

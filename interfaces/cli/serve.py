@@ -393,7 +393,7 @@ async def _serve(
                     val_room = room
             if not one.robot.is_base:
                 routes += Plans(one.robot.arm, access, operator.clock).routes
-            routes += _station(one, serving).routes
+            routes += _station(one, serving, taught=taught is not None).routes
             if one.folder:
                 others.append(Mount(one.folder, routes=routes))
             else:
@@ -461,7 +461,7 @@ def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
     return LiveOperator(config, access, clock=clock)
 
 
-def _station(serving: _Serving, all_served: Sequence[_Serving]) -> Station:
+def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool) -> Station:
     """Make a robot's page."""
     from interfaces.station.chain import described
     from interfaces.station.page import Station
@@ -471,6 +471,7 @@ def _station(serving: _Serving, all_served: Sequence[_Serving]) -> Station:
     offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
     offers |= {Offer.CAMERA} if serving.camera else set()
     offers |= {Offer.TERMINALS} if serving.val_files is not None else set()
+    offers |= {Offer.CLASS} if taught else set()
     pages = [(one.robot.name, f"{one.folder}/", one is serving) for one in all_served]
     return Station(described(robot), panels_of(offers), pages if len(pages) > 1 else ())
 

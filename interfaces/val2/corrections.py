@@ -75,26 +75,34 @@ class Corrector:
         self._begun: float | None = None if corrections.since_alter else 0.0
         """From when on their times count [s]; None while they don't."""
         self._next = 0
-        self.missed = 0
-        """Those that came while nothing was altered."""
+        self._missed = 0
+        self._problems: list[str] = []
 
-    def advance(self, now: float) -> list[str]:
-        """Give what is due by now [s]; what couldn't be followed, or not in time."""
-        problems, altered = [], self._arm.altered_since(now=now)
+    def advance(self, now: float) -> None:
+        """Give what is due by now [s]."""
+        altered = self._arm.altered_since(now=now)
         if self._corrections.since_alter and altered != self._begun:
             self._begun, self._next = altered, 0
         while (due := self.next_deadline()) <= now:
             row = self._corrections.rows[self._next]
             self._next += 1
             if altered is None:
-                self.missed += 1
+                self._missed += 1
                 continue
             outcome = self._arm.correct(row[1:], given=due, now=now)
             receipt = None if outcome is None else outcome.receipt
             late = "" if receipt is None else receipt.hindrance
             if problem := late if outcome is None or not outcome.reason else in_millimetres(outcome.reason):
-                problems.append(f"correction of {row[0]:g} s: {problem}")
-        return problems
+                self._problems.append(f"correction of {row[0]:g} s: {problem}")
+
+    def report(self) -> list[str]:
+        """What wasn't done as the file has it, in few lines."""
+        lines, more = self._problems[:1], len(self._problems) - 1
+        if more > 0:
+            lines.append(f"{more} more weren't followed, or not in time")
+        if self._missed:
+            lines.append(f"{self._missed} corrections came while no program said ALTER")
+        return lines
 
     def next_deadline(self) -> float:
         """When the next one is due [s]; infinity for never."""

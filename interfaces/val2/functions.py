@@ -17,6 +17,7 @@ import numpy as np
 from interfaces.val2.context import Context
 from interfaces.val2.errors import ValError
 from interfaces.val2.formats import checked, leading_number
+from interfaces.val2.motion.places import shifted
 from interfaces.val2.rows import Form, numbered
 from interfaces.val2.signals import group
 from interfaces.val2.syntax import Apply
@@ -129,12 +130,6 @@ def _trans(dialect: Dialect, x: float, y: float, z: float, *angles: float | None
     """Angles that were left out are those of no turn."""
     o, a, t = (none if angle is None else angle for angle, none in zip(angles, dialect.offsets, strict=True))
     return dialect.transformation(x, y, z, o, a, t)
-
-
-def _shift(frame: Transformation, *way: float) -> Transformation:
-    X = np.array(frame.X)
-    X[:3, 3] += way
-    return Transformation(X)
 
 
 def _scale(frame: Transformation, factor: float) -> Transformation:
@@ -306,7 +301,7 @@ _FUNCTIONS: Final = (
          "A transformation [mm, deg], in V+ by yaw, pitch, roll; without angles, no turn.", "VAL-II", _trans,
          tags="dialect"),
     Form("SHIFT", "a:frame, dx?=0, dy?=0, dz?=0 -> frame", "A location shifted in world axes [mm].", "VAL-II",
-         _shift, usage="SHIFT(a BY dx, dy, dz)"),
+         shifted, usage="SHIFT(a BY dx, dy, dz)"),
     Form("SCALE", "a:frame, factor -> frame", "A location whose X, Y and Z are multiplied by a factor.", "V+",
          _scale, usage="SCALE(a BY factor)"),
     Form("INVERSE", "a:frame -> frame", "The transformation back.", "VAL", Transformation.inverse),

@@ -58,9 +58,9 @@ from interfaces.val2.syntax import (
 from interfaces.val2.units import NOT_READY, NOT_VALID, OURS, TERMINAL
 from interfaces.val2.values import NULL, Location, Transformation, about_z
 
-Do: TypeAlias = Callable[..., object]
+Do: TypeAlias = Callable[..., Any]
 """Does what an instruction wants, of the context, the instruction, and the values of its operands."""
-Ask: TypeAlias = Callable[[], object]
+Ask: TypeAlias = Callable[[], Any]
 """Does it with operands that have been evaluated."""
 
 
@@ -312,22 +312,14 @@ def _attach(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     return x.special(attach)
 
 
-def _detach(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+def _detach(c: Context, _: Instruction, unit: float) -> Pause[None]:
     """DETACH; the arm when it stands."""
-    c, (unit,) = x.context, x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
-
-    def free() -> None:
-        if c.task is not None:
-            c.task.robot = False
-
-    def detach(s: Slots) -> Action:
-        number = whole(unit(s))
-        if number == 0:
-            return Waiting(_standing(c, free, n + 1))
+    if number := whole(unit):
         c.units.detach(number)
-        return n + 1
-
-    return x.special(detach)
+        return
+    yield from _standing(c, lambda: None, None)
+    if c.task is not None:
+        c.task.robot = False
 
 
 def _read(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -448,6 +440,21 @@ def _timed(c: Context, time: Callable[[Slots], float], prepare: Callable[[Slots]
     return timed
 
 
+def _process(process: Callable[..., Pause[None]], *, interruptible: bool = False) -> Act:
+    """What takes a while, by the values of its operands."""
+
+    def act(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
+        prepare = x.prepared(i, process)
+        return x.special(lambda s: Waiting(_followed(prepare(s)(), n + 1), interruptible))
+
+    return act
+
+
+def _followed(process: Pause[None], following: int) -> Pause[int]:
+    yield from process
+    return following
+
+
 def _nothing(_c: Context, _i: Instruction) -> None:
     """Wait alone."""
 
@@ -545,7 +552,7 @@ def _changes(e: Expression) -> bool:
 def _wait(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """WAIT's condition; a bare number is a signal's, as in VAL. WAIT alone: a slice."""
     if not i.operands:
-        return _sleep(x, i, n)
+        return _sleeping(x, i, n)
     (e,), c = i.operands, x.context
     test = x.condition(e if literal(e) is None else Apply("SIG", (e,), e.at))
     polled = _changes(e)
@@ -558,21 +565,15 @@ def _wait(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     return x.special(lambda s: Waiting(waiting(s), interruptible=True))
 
 
-def _sleep(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
-    """WAIT.EVENT: a time, or for ever, as there are no other programs to send events."""
-    c, *_, seconds = x.context, *x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
+def _sleep(c: Context, i: Instruction, *given: float | None) -> Pause[None]:
+    """WAIT.EVENT: a time, or for ever, as there are no other programs to send events; WAIT alone: a slice."""
     otherwise = SLICE if i.keyword == "WAIT" else math.inf
+    over = c.now + (otherwise if given[-1] is None else given[-1])
+    while c.now < over:
+        yield over
 
-    def waiting(until: float) -> Generator[float, None, int]:
-        while c.now < until:
-            yield until
-        return n + 1
 
-    def sleep(s: Slots) -> Waiting:
-        given = seconds(s)
-        return Waiting(waiting(c.now + (otherwise if given is None else given)), interruptible=True)
-
-    return x.special(sleep)
+_sleeping: Final = _process(_sleep, interruptible=True)
 
 
 def _grasp(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
@@ -1106,7 +1107,7 @@ _ROWS: Final = (
          tags="beside reading", rule="timing"),
     Form("RESET", "", "Turn all outputs off.", "V+", _now(lambda c, _: c.signals.reset()), tags="beside"),
     Form("WAIT", "condition?", "Wait until a condition holds.", "VAL", _wait),
-    Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleep),
+    Form("WAIT.EVENT", "mask?, seconds:seconds?", "Wait for a time.", "V+", _sleeping),
     Form("TIMER", "number:timer, seconds", "Set a timer.", "VAL-II", _now(_set_timer),
          usage="TIMER number = seconds", tags="beside", rule="timing"),
     Form("REACT", "signal:signal, program:program?, priority:priority?",
@@ -1155,7 +1156,8 @@ _ROWS: Final = (
     # Files.
     Form("ATTACH", "unit?=0, mode?=0, device:string?", "Take a logical unit; without one the arm, when it's free.",
          "V+", _attach, usage="ATTACH (unit, mode) [device]", rule="device"),
-    Form("DETACH", "unit?=0", "Give a logical unit back; without one the arm, when it stands.", "V+", _detach,
+    Form("DETACH", "unit?=0", "Give a logical unit back; without one the arm, when it stands.", "V+",
+         _process(_detach),
          usage="DETACH (unit)", rule="device"),
     *(Form(name, "unit, record?, mode?, file:string", f"Open a file {what}.", "V+",
            _now(lambda c, i, unit, _r, _m, file: c.units.open(i.keyword, whole(unit), file)),

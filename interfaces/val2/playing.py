@@ -108,11 +108,12 @@ class Player:
         """Do what is due by now [s]."""
         for event in self._controller.advance(now=now):
             self._take(event, now)
-        for problem in () if self._corrector is None else self._corrector.advance(now):
-            self._listeners.warned(problem)
+        if self._corrector is not None:
+            self._corrector.advance(now)
         self.done |= self._ended and not self._goes_on()
-        if self.done and self._corrector is not None and self._corrector.missed:
-            self._listeners.warned(f"{self._corrector.missed} corrections came while no program said ALTER")
+        if self.done and self._corrector is not None:
+            for line in self._corrector.report():
+                self._listeners.warned(line)
             self._corrector = None
 
     def next_deadline(self) -> float:

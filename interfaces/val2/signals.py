@@ -171,10 +171,6 @@ class Signals:
         for number in sorted(self._on.intersection(OUTPUTS)):
             self._turn(number, on=False)
 
-    def states(self, numbers: Sequence[int]) -> list[bool]:
-        """Whether signals are on, for the monitor's IO."""
-        return [n in self._on for n in numbers]
-
     def changes(self) -> list[tuple[int, bool]]:
         """What has changed since this was last asked, oldest first."""
         changes, self._changes = self._changes, []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Final
@@ -11,7 +11,6 @@ import numpy as np
 
 from interfaces.lab.driving.operators import operator
 from interfaces.lab.driving.run import run
-from interfaces.lab.runner import Made, pooled
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from interfaces.runs.drive_run import DriveCase, Row, row_of
 from interfaces.runs.summary import Attribution
@@ -47,25 +46,6 @@ def cases(
             delays, robots, operators, architectures, transports, seeds
         )
     ]
-
-
-def sweep(
-    chosen: Sequence[DriveCase],
-    work: Callable[[DriveCase], Made],
-    *,
-    workers: int = 1,
-) -> list[Made]:
-    """Work on all cases, some at once; what's made is in the order of the cases, and doesn't depend on the workers.
-
-    Args:
-        chosen: What to run.
-        work: What is done with a case, as `measure`; a function of a module, for other processes.
-        workers: Processes at once, 1 to 64.
-
-    Raises:
-        InvalidValueError: If there are too few or too many workers.
-    """
-    return pooled([(work, (case,)) for case in chosen], workers=workers)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,8 @@ const ENDED = { expired: "it ran out", released: "given back", "taken over": "it
 function standing({ lease, link, holds, welcome }) {
   if (link !== "live") return ["none", "help", "Control unknown"];
   if (holds) return ["mine", "sports_esports", "You have control"];
+  if (lease.offered_until) return ["mine", "sports_esports", "It's your turn"];
+  if (lease.waiting) return ["other", "hourglass_top", `You are number ${lease.waiting} in the queue`];
   if (lease.state === "held") return ["other", "person", `${lease.holder} has control`];
   if (lease.state === "ending") return ["warn", "hourglass_top", "The robot comes to rest"];
   return ["none", "lock_open", welcome?.role === "viewer" ? "You watch" : "Nobody has control"];
@@ -36,12 +38,22 @@ export function Panel({ station }) {
     else if (wanted.current && state === "free") ask("acquire");
   });
 
+  useEffect(() => {
+    if (lease.offered_until) station.announce("It's your turn: take control", { urgent: true });
+  }, [lease.offered_until]);
+
+  // In a class, who can't have control at once asks for it.
+  const { member, offered_until: offered, waiting } = lease;
+  const queued = Boolean(member && !holds && session.mayCommand);
+  const busy = lease.state !== "free" || waiting > 0 || Boolean(session.present?.offered);
   const [tone, symbol, words] = standing(session);
   const button = (id, text, shown, action) =>
     html`<button class="small" type="button" id=${id} hidden=${!(live && shown)} onClick=${action}>${text}</button>`;
   return html`
     <${Pill} id="control-pill" tone=${tone} icon=${symbol}>${words}<//>
-    ${button("take", "Take control", session.mayCommand && lease.state === "free", () => ask("acquire"))}
+    ${button("take", "Take control", session.mayCommand && (queued ? offered || !busy : lease.state === "free"), () => ask("acquire"))}
+    ${button("ask", "Ask for control", queued && busy && !offered && !waiting, () => session.wish("request-control"))}
+    ${button("withdraw", offered ? "Not now" : "Leave the queue", queued && (offered || waiting), () => session.wish("withdraw"))}
     ${button("give", "Give back", holds, () => ask("release"))}
     ${button("take-over", "Take over", welcome?.role === "admin" && lease.state === "held" && !holds, () => setAsking(true))}
     <${Name} station=${station} />

@@ -49,31 +49,38 @@ function RealRobot({ station }) {
       Resume</button>`;
 }
 
-/** Asks for a token where the server lets nobody in without one. */
+/** Asks for a token, or a class's code and a name, where the server lets nobody in without one. */
 function Door({ station }) {
   const { session } = station;
   const locked = session.link === "locked";
-  const [dialog, input] = [useRef(null), useRef(null)];
+  const [dialog, input, name] = [useRef(null), useRef(null), useRef(null)];
+  const teaches = station.config.panels.some((panel) => panel.name === "class");
+  const code = new URLSearchParams(location.search).get("code");
   useEffect(() => {
     if (!locked) return;
     sessionStorage.removeItem("token");
+    if (code && !session.token) input.current.value = code;
     dialog.current.showModal();
   }, [locked]);
 
   function enter() {
-    const token = input.current.value;
-    sessionStorage.setItem("token", token);
+    const token = input.current.value.trim();
+    if (name.current) station.rename(name.current.value.trim());
+    if (code) history.replaceState(null, "", location.pathname);
     input.current.value = "";
     session.unlock(token);
-    station.dispatchEvent(new Event("unlocked"));
   }
 
-  return html`<dialog class="door" id="door" ref=${dialog} aria-label="Token" onCancel=${(event) => event.preventDefault()}>
+  const wrong = teaches ? "That code isn't valid: codes change every ten minutes." : "That token isn't valid here.";
+  return html`<dialog class="door" id="door" ref=${dialog} aria-label=${teaches ? "Join the class" : "Token"}
+    onCancel=${(event) => event.preventDefault()}>
     <form method="dialog" onSubmit=${enter}>
-      <h2>This server asks for a token</h2>
-      <label for="token">Token of a viewer, an operator or an admin</label>
-      <input id="token" ref=${input} type="password" autocomplete="off" spellcheck="false" required />
-      <p class="refused" id="refused" role="alert">${locked && session.token ? "That token isn't valid here." : ""}</p>
+      <h2>${teaches ? "Join the class" : "This server asks for a token"}</h2>
+      ${teaches && html`<label for="own-name">Your name, as others see it</label>
+        <input id="own-name" ref=${name} maxlength="24" autocomplete="off" required defaultValue=${session.name} />`}
+      <label for="token">${teaches ? "Code of six characters, or a token" : "Token of a viewer, an operator or an admin"}</label>
+      <input id="token" ref=${input} type=${teaches ? "text" : "password"} autocomplete="off" spellcheck="false" required />
+      <p class="refused" id="refused" role="alert">${locked && session.token ? wrong : ""}</p>
       <button class="main" id="enter">Enter</button>
     </form></dialog>`;
 }

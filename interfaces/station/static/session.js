@@ -14,6 +14,8 @@ const HELD_UP = 0.4;
 const LONGEST_WAIT = 1500;
 const PINGS = 10;
 const KEY = "vrs-session";
+/** Tokens are longer than a class's codes. */
+const SHORTEST_TOKEN = 20;
 /** A token opens its own role and those below it. */
 const ROLES = ["admin", "operator", "viewer"];
 
@@ -41,6 +43,8 @@ export class Session extends EventTarget {
       /** How the way to the robot is; null before that was asked. */
       network: null,
       epoch: null,
+      /** Of a class: who is here; null before that was asked. */
+      present: null,
     });
     this.sync = new ClockSync();
     this.reader = null;
@@ -169,6 +173,8 @@ export class Session extends EventTarget {
       this.network = message;
       this.emit("network", message);
       if (before && message.changed_at !== before.changed_at) this.emit("rerouted", message);
+    } else if (message.type === "present") {
+      this.present = message;
     } else if (message.type === "outcome") {
       const entry = this.orders.answer(message);
       if (entry) this.emit("outcome", entry);
@@ -198,12 +204,17 @@ export class Session extends EventTarget {
     this.welcome = welcome;
     this.key = welcome.session;
     this.roles = [welcome.role];
+    // A code counts once, and for this door alone: from now on the session's secret is the token.
+    if (this.token && this.token.length < SHORTEST_TOKEN) this.token = welcome.session;
+    if (this.token) sessionStorage.setItem("token", this.token);
+    if (!again) this.emit("unlocked");
     this.orders.renew(welcome.resumed, now);
     if (!again) this.reader = this.makeReader();
     else if (this.reader) this.reader.number += 1;
     for (let k = 0; k < PINGS; k++) this.ping();
     this.emit("welcome", welcome);
     this.setLease(welcome.lease);
+    if (welcome.lease.member) this.wish("who");
     this.reader?.follow(now);
   }
 

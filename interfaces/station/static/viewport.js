@@ -29,7 +29,7 @@ export function Viewport({ station, Scene, legend, standing }) {
     }
     const { scene } = station;
     const link = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], { take: (data) => scene.take(data), state: () => {} });
-    station.addEventListener("unlocked", () => link.connect());
+    station.on("unlocked", () => link.connect());
     link.connect();
     return effect(() => scene.paint(theme() === "dark"));
   }, []);

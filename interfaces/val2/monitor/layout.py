@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from interfaces.val2.motion.places import Where
-from interfaces.val2.syntax import Number, Variable
 from interfaces.val2.values import VAL2, Dialect, Location, Transformation, Value
 
 WIDTH = 79
@@ -24,12 +23,6 @@ def number(value: float) -> str:
     if value.is_integer() and abs(value) < 1e15:
         return str(int(value))
     return f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
-
-
-def variable(named: Variable) -> str:
-    """A variable as it's written, its indices numbers."""
-    indices = [number(index.value) for index in named.indices if isinstance(index, Number)]
-    return f"{named.name}[{','.join(indices)}]" if indices else named.name
 
 
 def heading(dialect: Dialect = VAL2) -> str:

@@ -18,6 +18,7 @@ from interfaces.val2.monitor.state import (
     nothing,
     pieces,
 )
+from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Compound, Number, Variable
 from interfaces.val2.values import NULL, Dialect, Location, PrecisionPoint, Transformation
 
@@ -153,7 +154,7 @@ def teach(state: TerminalState, rest: str) -> Dialogue:
     if not variable.indices and not variable.name[-1].isdigit():
         variable = replace(variable, name=f"{variable.name}1")
     answers = frozenset({"", "E", "END"})
-    while not ((yield Question(f"{layout.variable(variable)}? ", Expects.COMMAND, answers)) or "").strip():
+    while not ((yield Question(f"{print_expression(variable)}? ", Expects.COMMAND, answers)) or "").strip():
         with state.guarded():
             value = state.here(variable)
             state.controller.memory.set(variable, value)

@@ -239,7 +239,7 @@ def io(state: TerminalState, _rest: str) -> None:
     signals = state.controller.signals
     for title, numbers in (("Outputs", OUTPUTS), ("Inputs", INPUTS), ("Internal", INTERNAL)):
         for row in (numbers[k : k + _IN_A_LINE] for k in range(0, len(numbers), _IN_A_LINE)):
-            states = ["1" if on else "0" for on in signals.states(row)]
+            states = ["1" if signals.on(number) else "0" for number in row]
             if row[0] == numbers[0] or "1" in states:
                 eights = " ".join("".join(states[k : k + 8]) for k in range(0, len(states), 8))
                 state.say(f"{title:8}  {row[0]:4} {eights} {row[-1]}")

@@ -14,7 +14,7 @@ from interfaces.val2.memory import KINDS, MOST_VALUES, Memory
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, named, nothing, pieces
 from interfaces.val2.parser import parse_expression
-from interfaces.val2.printer import print_program
+from interfaces.val2.printer import print_expression, print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file, with_called
 from interfaces.val2.syntax import Program, Variable
 from interfaces.val2.values import Value
@@ -221,7 +221,7 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
 def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:
     """Variables of a kind, by how they're written."""
     entries = (NamedValue(*one) for one in memory.variables())
-    return {layout.variable(e.variable): e for e in entries if isinstance(e.value, KINDS[kind])}
+    return {print_expression(e.variable): e for e in entries if isinstance(e.value, KINDS[kind])}
 
 
 def _variables(node: object) -> Iterator[Variable]:

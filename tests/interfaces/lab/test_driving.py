@@ -14,7 +14,8 @@ from interfaces.cli.main import app
 from interfaces.lab.driving.operators import STYLES, operator
 from interfaces.lab.driving.output import COMPARED, summary
 from interfaces.lab.driving.run import run
-from interfaces.lab.driving.sweep import CAUSES, attributed, cases, grouped, measure, paired, sweep
+from interfaces.lab.driving.sweep import CAUSES, attributed, cases, grouped, measure, paired
+from interfaces.lab.runner import pooled
 from interfaces.runs.drive_run import DriveCase
 from interfaces.teleop.architectures import Transport
 from robots.ipr.parameters import IPR
@@ -146,7 +147,8 @@ def test_lost_packets_are_repeated_and_the_path_is_kept(tmp_path: Path) -> None:
 
 def test_the_table_doesn_t_depend_on_the_workers() -> None:
     chosen = cases(["II", "timeline"], [Transport.STREAM], ["thu@3.3"], ["bare"], ["mixed"], range(2), 10.0)
-    assert sweep(chosen, measure, workers=1) == sweep(chosen, measure, workers=2)
+    calls = [(measure, (case,)) for case in chosen]
+    assert pooled(calls, workers=1) == pooled(calls, workers=2)
 
 
 def test_a_paired_difference_has_a_verdict() -> None:

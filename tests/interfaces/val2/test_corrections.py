@@ -107,6 +107,13 @@ def test_what_the_limits_leave_no_room_for_is_told_and_the_path_goes_on() -> Non
     assert np.abs(MODEL.forward(found.q_virtual[-1])[0, 3] - 0.1) < 1e-6
 
 
+def test_many_problems_are_told_in_two_lines() -> None:
+    rows = tuple((0.3 + 0.1 * k, 0.0, 0.0, 900.0 + k, 0.0, 0.0, 0.0) for k in range(8))
+    _, told = run(Corrections(rows, since_alter=True))
+    assert told[0].startswith("correction of 0.3 s: ")
+    assert told[1:] == ["7 more weren't followed, or not in time"]
+
+
 def written(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "c.csv"
     path.write_text(text)

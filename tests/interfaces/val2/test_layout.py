@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from interfaces.val2.monitor import layout
+from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Number, Variable
 
 
@@ -23,8 +24,8 @@ def test_a_text_stays_on_its_line() -> None:
 
 def test_a_variable_is_written_with_its_indices() -> None:
     indices = tuple(map(Number, (1.0, -2.0, 0.5)))
-    assert layout.variable(Variable("a", indices)) == "a[1,-2,0.5]"
-    assert layout.variable(Variable("#p")) == "#p"
+    assert print_expression(Variable("a", indices)) == "a[1,-2,0.5]"
+    assert print_expression(Variable("#p")) == "#p"
 
 
 def test_words_stand_in_order_down_the_columns() -> None:
