@@ -56,8 +56,7 @@ async function give({ commands, session, replace }) {
 }
 
 /** The button that loads a plan file; asked first is whether it takes the place of what is planned. */
-export function Loader({ station, tool }) {
-  const { session, idle } = station;
+export function Loader({ strip: { station, session, idle }, tool }) {
   const input = useRef(null);
   const [found, setFound] = useState(null);
 

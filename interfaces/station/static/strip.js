@@ -49,6 +49,12 @@ class Strip {
     return last ? { id: this.chosen, start: parts[0].start, end: last.start + last.duration } : undefined;
   }
 
+  /** Why nothing can be commanded from here now; "" where it can. */
+  get idle() {
+    if (this.session.link !== "live") return "there's no connection";
+    return this.session.holds ? "" : "take control first";
+  }
+
   retime(id, start) {
     return this.session.order({ type: "retime", command_id: id, execute_at: start });
   }
@@ -149,8 +155,7 @@ function Tool({ station, id, icon, title, why = "", does, children, ...others })
 }
 
 function Tools({ strip }) {
-  const { station, session, chosen, moves, plays } = strip;
-  const { idle } = station;
+  const { station, session, idle, chosen, moves, plays } = strip;
   const [place, setPlace] = useState("up");
   const old = session.link !== "live";
   // It's drawn anew where it begins and ends, not for each time between.
@@ -179,7 +184,7 @@ function Tools({ strip }) {
     <span class="gap"></span>
     ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
       { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
-    <${Loader} station=${station} tool=${tool} />
+    <${Loader} strip=${strip} tool=${tool} />
     <span class="grow"></span>
     <span class="muted wide">Drag a scheduled move, or the strip to look back</span>
     ${tool("zoom-out", "remove", "Show more time", () => strip.zoom(1))}
