@@ -8,6 +8,8 @@ const OLD = {
 };
 /** So long a robot may wait before it's told why [ms]: for who takes control it goes on by itself. */
 const PATIENCE = 1200;
+/** A browser that is busy may offer no WebGL at first: it's tried so often, so long after each other [ms]. */
+const [MOST_TRIES, AGAIN] = [4, 1500];
 /** Between two looks at what changes with the time [ms]. */
 const PERIOD = 80;
 
@@ -19,20 +21,23 @@ const PERIOD = 80;
 export function Viewport({ station, Scene, legend, standing }) {
   const [pane, labels] = [useRef(null), useRef(null)];
   const [flat, setFlat] = useState(false);
+  const [tries, setTries] = useState(1);
   useLayoutEffect(() => {
     try {
       station.scene = new Scene(pane.current, labels.current);
     } catch {
-      pane.current.replaceChildren();
+      pane.current.querySelector("canvas")?.remove();
       setFlat(true);
-      return undefined;
+      const timer = tries < MOST_TRIES ? setTimeout(() => setTries(tries + 1), AGAIN) : 0;
+      return () => clearTimeout(timer);
     }
+    setFlat(false);
     const { scene } = station;
     const link = new window.VrsLink("/meshcat", ["vrs.meshcat.1"], { take: (data) => scene.take(data), state: () => {} });
     station.on("unlocked", () => link.connect());
     link.connect();
     return effect(() => scene.paint(theme() === "dark"));
-  }, []);
+  }, [tries]);
   return html`<div class="view" data-link=${station.session.link}>
     <div class="pane" id="pane" role="img" aria-label="Both robots in 3D" ref=${pane}>
       ${flat && html`<p class="no-3d">No 3D view: this browser offers no WebGL.</p>`}</div>
