@@ -41,7 +41,7 @@ NOT_HERE: Final = {
         "/docs",
     ),
     "base": ("/nothing", "/station/station.py", "/view/%2e%2e/secret", "/recordings/copy/x", "/docs"),
-    "replay": ("/nothing", "/replay/replay.py", "/station/vrs.js", "/docs"),
+    "replay": ("/nothing", "/replay/replay.py", "/station/station.py", "/docs"),
 }
 FRAMES: Final = re.compile("/(view|replay)(/|$)")
 """Pages that the station shows in frames of its own."""

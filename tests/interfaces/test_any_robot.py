@@ -253,8 +253,9 @@ def test_it_is_driven_live_seen_on_the_page_and_recorded(tmp_path: Path, new_pag
             "insertion: 'replace' }, 'lift')"
         )
         page.until(lambda: np.allclose(page.real, [0.5, 0.35, -0.5], atol=2e-3))
-        page.wait("document.querySelectorAll('.joint .value')[1].textContent === '0.350 m'")
-        page.wait("document.querySelectorAll('.joint .value')[0].textContent === '28.6°'")
+        for name, value, unit in ("J2", "350.0", "mm"), ("J1", "28.6", "°"):
+            shown = f"document.getElementById('jog-{name}')"
+            page.wait(f"{shown}.value === '{value}' && {shown}.parentElement.textContent.trim() === '{unit}'")
         assert page.errors == []
         page.page.context.close()
     summary = json.loads(vrs("compare", path, "--robot", ARM, "--json"))

@@ -182,7 +182,7 @@ def test_plots_cover_the_offset_errors_and_every_joint() -> None:
 
 def test_a_run_of_an_hour_still_gives_a_small_file(tmp_path: Path) -> None:
     run = make_run(k=180_000)
-    write_report(tmp_path / "long.html", run, {})
+    write_report(tmp_path / "long.html", run, summarize(make_run()))
     assert (tmp_path / "long.html").stat().st_size < 8e6
     assert scene(run)["t_end"] <= 20.0
 

@@ -115,6 +115,7 @@ def ordered() -> dict[str, commands.Command | None]:
         ),
         "alter": commands.Alter([0.0, 0.0, 0.005, 0.0, 0.0, 0.125], commands.Frame.TOOL, POSE, True, 1.5),
         "no more offset": commands.Alter(issued_at=1.75),
+        "redo": commands.Redo(),
     }
 
 
