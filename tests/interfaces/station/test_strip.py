@@ -121,16 +121,30 @@ def test_a_chosen_move_stays_chosen(page: Page) -> None:
     clear(page)
 
 
+CORRECTIONS = "station.session.state.corrections"
+
+
+def undo(page: Page, wanted: dict[int, list[float]], corrections: int) -> None:
+    """Take the newest command back, until that is planned that is wanted, or the virtual robot was put right."""
+    page.page.click("#undo")
+    page.until(lambda: same(scheduled(page), wanted) or page.get(CORRECTIONS) != corrections)
+
+
 def test_undo_is_redone(page: Page) -> None:
-    page.take_control().rest()
-    first = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 60)
-    before = scheduled(page)
-    second = plan(page, "stretch", 80)
-    whole = scheduled(page)
-    page.page.click("#undo")
-    page.until(lambda: same(scheduled(page), before))
-    page.page.click("#undo")
-    page.until(lambda: scheduled(page) == {})
+    page.take_control()
+    # What was commanded before the virtual robot was put right can't be taken back: then it's tried again.
+    for _ in range(4):
+        page.rest()
+        known = page.get(CORRECTIONS)
+        first = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 60)
+        before = scheduled(page)
+        second = plan(page, "stretch", 80)
+        whole = scheduled(page)
+        undo(page, before, known)
+        undo(page, {}, known)
+        if page.get(CORRECTIONS) == known:
+            break
+        clear(page)
     page.page.click("#redo")
     page.until(lambda: same(scheduled(page), before))
     page.page.click("#redo")
