@@ -252,6 +252,9 @@ def test_plots_say_what_they_show_and_look_back(page: Page, tmp_path: Path) -> N
     assert len(delays) > 20
     assert delays == pytest.approx([0.1] * len(delays), abs=1e-6)
     assert "worst: joint" in page.page.locator("#value-joint-error").text_content()
+    named = page.page.locator("#plot-joint-error .u-legend .u-label")
+    assert [one for one in named.all() if not one.is_visible()] == []
+    assert named.all_text_contents() == list("123456")
     assert "round trip" in page.page.locator("#value-delay").text_content()
     label = "document.getElementById('plot-tool-error').getAttribute('aria-label')"
     page.wait(f"{label}?.startsWith('Tool error, mm, Newest 30 s: ')")
