@@ -22,7 +22,7 @@ def test_the_four_interfaces(encoding):
             assert robot.welcome.robot == "puma560"
             assert robot.acquire().yours
             assert robot.lease.holder == "tester"
-            issued = robot.designer.issue(to(1), execute_in=0.05, wait=5.0)
+            issued = robot.designer.issue(to(1, speed=0.02), execute_in=0.05, wait=5.0)
             assert issued.receipt.status == "accepted"
             assert robot.supervisor.ask(1e3).frame.q.tolist() == serving.hub.site.engine.joints(1e3).tolist()
             assert robot.observer.ask(0.0).frame.q.tolist() == HOME.tolist()
