@@ -49,6 +49,8 @@ export class Session extends EventTarget {
     this.sync = new ClockSync();
     this.reader = null;
     this.orders = new Orders((message) => this.send(message));
+    /** Whether a token was just given at the door, and nobody has been let in by it yet. */
+    this.entered = false;
     this.roles = token ? [...ROLES] : ["operator", "viewer"];
     this.requests = 0;
     this.pings = 0;
@@ -94,6 +96,7 @@ export class Session extends EventTarget {
   /** Let a token count from now on; null for none. */
   unlock(token) {
     this.token = token;
+    this.entered = true;
     this.roles = token ? [...ROLES] : ["operator", "viewer"];
     this.become("connecting");
     this.connect();
@@ -207,7 +210,8 @@ export class Session extends EventTarget {
     // A code counts once, and for this door alone: from now on the session's secret is the token.
     if (this.token && this.token.length < SHORTEST_TOKEN) this.token = welcome.session;
     if (this.token) sessionStorage.setItem("token", this.token);
-    if (!again) this.emit("unlocked");
+    if (this.entered) this.emit("unlocked");
+    this.entered = false;
     this.orders.renew(welcome.resumed, now);
     if (!again) this.reader = this.makeReader();
     else if (this.reader) this.reader.number += 1;

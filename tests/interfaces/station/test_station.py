@@ -35,6 +35,20 @@ def page(browser: Any, server: Child) -> Iterator[Page]:
         yield opened.open()
 
 
+def test_a_page_has_one_socket_of_each_kind(browser: Any, server: Child) -> None:
+    with paged(browser, station(server)) as page:
+        opened: list[str] = []
+        page.page.on("websocket", lambda socket: opened.append(socket.url.rpartition("/")[2]))
+        page.open()
+        # The server may let the page in when its picture is there already.
+        page.get(
+            "(({ session }) => { const { welcome } = session; session.welcome = null; "
+            "session.begin(welcome, performance.now() / 1000); })(station)"
+        )
+        page.page.wait_for_timeout(500)
+        assert opened.count("meshcat") == 1, opened
+
+
 def moved(page: Page, by: float, since: list[float]) -> bool:
     """Whether both robots have moved."""
     return all(max(abs(a - b) for a, b in zip(q, since, strict=True)) > by for q in (page.virtual, page.real))
