@@ -87,7 +87,7 @@ function Go({ station, kind, go, children }) {
 
 /** A number as it is, which may be typed: Enter goes there, Escape takes it back. */
 function Field({ jog, kind, k, field: { name, sign }, label, title, go }) {
-  const shown = useComputed(() => (jog.q ? figure(jog.values(kind, jog.q)[k], 1) : "–"));
+  const shown = useComputed(() => figure(jog.shown[kind].value?.[k], 1));
   const typed = jog.typed[name];
 
   function key(event) {
@@ -126,7 +126,7 @@ function Slider({ station, k, field: { name, low, high }, go }) {
   const { jog } = station;
   const typed = Number(jog.typed[name] ?? NaN);
   const grain = (high - low) / GRAINS;
-  const shown = useComputed(() => (jog.q ? Math.round(jog.values("joints", jog.q)[k] / grain) * grain : low));
+  const shown = useComputed(() => (jog.q ? Math.round(jog.shown.joints.value[k] / grain) * grain : low));
   const why = station.idle;
 
   function drop() {

@@ -1,7 +1,7 @@
 // What jogging asks for: by how much and how fast, joint by joint or along and about the tool's axes, held or in steps.
 import { anglesOf, exponential, multiply, turned } from "./chain.js";
 import { Speed } from "./handling.js";
-import { figure, observed } from "./ui.js";
+import { computed, figure, observed } from "./ui.js";
 
 const SPEED = "vrs-speed";
 const POSES = "vrs-poses";
@@ -34,6 +34,9 @@ export class Jogging {
       wrong: "",
       saved: {},
     });
+    const shown = (kind) => computed(() => this.q && this.values(kind, this.q));
+    /** Values of the fields at the joints that are shown, see `fields`. */
+    this.shown = { joints: shown("joints"), pose: shown("pose") };
     station.on("welcome", ({ robot }) => {
       this.kept = `${POSES}-${robot}`;
       this.saved = JSON.parse(localStorage.getItem(this.kept) ?? "{}");

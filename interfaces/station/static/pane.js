@@ -1,7 +1,7 @@
 // The 3D view of an arm: both robots, the committed path, what is shown and how far it can be trusted, and the past.
 import { History } from "./history.js";
 import { StationScene } from "./twins.js";
-import { clockText, html, untracked, useMemo, useOn, useRef, useSignalEffect } from "./ui.js";
+import { clockText, html, useMemo, useOn, useRef, useSignalEffect } from "./ui.js";
 import { Viewport } from "./viewport.js";
 
 /** How long a change of the time that is looked at is spoken of [s]. */
@@ -39,7 +39,6 @@ export function Panel({ station }) {
     else scene?.resume();
     changed.at = -Infinity;
     dress();
-    untracked(() => station.dispatchEvent(new CustomEvent("cursor", { detail: cursor })));
   });
   useOn(session, "edit", ({ before, after, change }) => {
     dress();

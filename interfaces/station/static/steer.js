@@ -1,4 +1,5 @@
 // Steering: as long as a hand holds something, its input is sent; when it lets go, the robot comes to rest.
+import { effect, untracked } from "./ui.js";
 
 /** Time between two inputs [ms]; each holds for 0.2 s at the engine. */
 const PERIOD = 40;
@@ -32,7 +33,7 @@ export class Steer {
     station.addEventListener("stopping", () => this.releaseAll({ silently: true }));
     station.on("lease", () => this.session.holds || this.releaseAll());
     station.on("link", (link) => link === "live" || this.releaseAll());
-    station.addEventListener("cursor", () => this.blind && this.releaseAll());
+    effect(() => this.blind && untracked(() => this.releaseAll()));
   }
 
   /** Whether the picture shows another time than now: nobody steers by that. */

@@ -1,6 +1,6 @@
 // What the 3D views of all robots share: the picture, a legend that hides parts, a badge, and words across.
 import { theme } from "./theme.js";
-import { effect, html, Icon, useEffect, useLayoutEffect, useRef, useState } from "./ui.js";
+import { effect, html, Icon, useEvery, useLayoutEffect, useRef, useState } from "./ui.js";
 
 const OLD = {
   stale: ["hourglass_empty", "Stale: what you see is old"],
@@ -57,10 +57,7 @@ function Entry({ station, entry: [path, name, note] }) {
 /** How the picture stands: a badge, how far the real robot is behind, and words across where something is in the way. */
 function Standing({ session, standing }) {
   const [, look] = useState(0);
-  useEffect(() => {
-    const timer = setInterval(() => look((count) => count + 1), PERIOD);
-    return () => clearInterval(timer);
-  }, []);
+  useEvery(PERIOD, () => look((count) => count + 1));
   const { status, symbol, words, title, ahead, across } = standing();
   const { link, state, holds } = session;
   const waiting = useRef(null);
