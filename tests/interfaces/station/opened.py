@@ -14,6 +14,8 @@ from tests.interfaces.live_rig import Child
 SERVE = ("serve", "--body", "ideal", "--link-loss", "hold")
 """A server for tests: quick, and its robot waits for a machine that is busy."""
 PATIENCE = 60.0
+NOTICE = "document.getElementById('notice').textContent"
+"""What is said at the control that was used."""
 
 
 def station(server: Child) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station
+from tests.interfaces.live_rig import Child
+from tests.interfaces.station.opened import Page, paged, station
 from tests.interfaces.station.test_station import TOOL, moved, plan
 
 PAD = """
@@ -27,12 +27,6 @@ return one === document.body || !shell.contains(one) ? null : {
 STOPS = """var every = "#station :is(button, input, select, summary, [tabindex='0'])";
 window.stops = [...document.querySelectorAll(every)]
 .filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility()); stops.length"""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 @pytest.fixture

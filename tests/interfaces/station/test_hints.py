@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station
+from tests.interfaces.live_rig import Child
+from tests.interfaces.station.opened import Page, paged, station
 
 SHOWN = "!document.getElementById('hint').hidden"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 def apart(page: Page) -> bool:

@@ -11,7 +11,7 @@ import pytest
 
 from interfaces.val2.values import VAL2, Transformation
 from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station
+from tests.interfaces.station.opened import Page, paged, station
 from tests.interfaces.station.test_notices import told
 from tests.interfaces.station.test_station import moved
 
@@ -19,12 +19,6 @@ CRANE = "tests.interfaces.own_arm:ROBOT"
 """Three joints, of which the second is prismatic."""
 TOOL = "station.chain.toolAt(station.session.timeline.joints(station.session.timeline.end))"
 LAST = "station.session.orders.entries.at(-1)"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 @pytest.fixture

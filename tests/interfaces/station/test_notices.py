@@ -9,17 +9,9 @@ from typing import Any
 import pytest
 from axe_core_python.sync_playwright import Axe
 
-from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station
+from tests.interfaces.live_rig import Child
+from tests.interfaces.station.opened import NOTICE, Page, paged, station
 from tests.interfaces.station.test_station import moved
-
-NOTICE = "document.getElementById('notice').textContent"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 @pytest.fixture

@@ -16,17 +16,11 @@ from axe_core_python.sync_playwright import Axe
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station, until
+from tests.interfaces.live_rig import Child
+from tests.interfaces.station.opened import Page, paged, station, until
 
 TOOL = "station.drag.tool()"
 HOLDS = "station.session.holds"
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 @pytest.fixture

@@ -14,18 +14,11 @@ import pytest
 
 from interfaces.runtime.plan import parse_plan
 from robots import puma560
-from tests.interfaces.live_rig import Child, child
-from tests.interfaces.station.opened import SERVE, Page, paged, station, until
+from tests.interfaces.live_rig import Child
+from tests.interfaces.station.opened import NOTICE, Page, paged, station, until
 from tests.interfaces.station.test_station import moved, same, scheduled
 
-NOTICE = "document.getElementById('notice').textContent"
 BARS = """[...document.querySelectorAll('.move')].map((bar) => bar.getAttribute('aria-label').split(',')[0])"""
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 @pytest.fixture
@@ -55,7 +48,7 @@ def entries(page: Page) -> list[str]:
 
 def says(page: Page, button: str, words: str) -> None:
     """What a button that can't do anything now says when it's used."""
-    assert page.page.locator(button).get_attribute("aria-disabled") == "true"
+    page.wait(f"document.querySelector({button!r}).getAttribute('aria-disabled') === 'true'")
     page.page.locator(button).click(force=True)
     page.wait(f"{NOTICE}.toLowerCase().includes({words!r})")
     page.page.keyboard.press("Escape")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +29,6 @@ LOOP = "edit loop\n10 drive 1,25,20\ndrive 1,-25,20\ngoto 10\ne\n"
 def tokens(tmp_path_factory: Any) -> tuple[Path, dict[Role, str]]:
     path = tmp_path_factory.mktemp("tokens") / "tokens"
     return path, make_tokens(path)
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
-        yield running
 
 
 def shows(page: Page, expression: str) -> None:
