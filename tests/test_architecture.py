@@ -21,7 +21,7 @@ STRANGE = {"examples", "tests", "benchmarks"}
 ORDER = (
     "vrs",
     # The robots.
-    "robots.solids", "robots.base", "robots.robot", "robots.bullet", "robots.onboard", "robots.mobile",
+    "robots.solids", "robots.base", "robots.robot", "robots.description", "robots.bullet", "robots.onboard", "robots.mobile",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.timer", "interfaces.messages",
