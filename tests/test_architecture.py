@@ -21,7 +21,8 @@ STRANGE = {"examples", "tests", "benchmarks"}
 ORDER = (
     "vrs",
     # The robots.
-    "robots.solids", "robots.base", "robots.robot", "robots.description", "robots.bullet", "robots.onboard", "robots.mobile",
+    "robots.solids", "robots.base", "robots.robot", "robots.chain", "robots.description", "robots.bullet",
+    "robots.mujoco", "robots.onboard", "robots.simulated", "robots.mobile",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.timer", "interfaces.messages",
@@ -37,7 +38,17 @@ ORDER = (
 )
 # fmt: on
 """The rooms, folders and files, in their order: each imports only itself and what stands before it."""
-HEAVY = {"pybullet", "pybullet_data", "pybullet_utils", "roboticstoolbox", "spatialmath", "trimesh", "matplotlib"}
+HEAVY = {
+    "pybullet",
+    "mujoco",
+    "yourdfpy",
+    "pybullet_data",
+    "pybullet_utils",
+    "roboticstoolbox",
+    "spatialmath",
+    "trimesh",
+    "matplotlib",
+}
 NUMPY = 0.15
 """What importing NumPy takes on a machine of usual pace [s]."""
 SOCKETS = {"socket", "socketserver", "asyncio", "ssl", "http", "urllib", "selectors"}
