@@ -153,7 +153,7 @@ def _motion(link: ChainLink, q: Array) -> tuple[Array, Array]:
 
 
 def _turned(v: Array, R: Array) -> Array:
-    """Products v R of rows v, (k, 3), and matrices, (k, 3, 3) or one; BLAS would add in another order for one row."""
+    """Products v R of rows v, (k, 3), and matrices, (k, 3, 3) or one. BLAS would add a single row otherwise."""
     return np.asarray(v[:, 0:1] * R[..., 0, :] + v[:, 1:2] * R[..., 1, :] + v[:, 2:3] * R[..., 2, :])
 
 
