@@ -22,7 +22,7 @@ ORDER = (
     "vrs",
     # The robots.
     "robots.solids", "robots.base", "robots.robot", "robots.chain", "robots.description", "robots.bullet",
-    "robots.mujoco", "robots.onboard", "robots.simulated", "robots.mobile",
+    "robots.mujoco", "robots.drives", "robots.onboard", "robots.simulated", "robots.mobile",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.timer", "interfaces.messages",

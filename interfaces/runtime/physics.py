@@ -208,7 +208,7 @@ class PhysicsProcess:
         Raises:
             InvalidValueError: If no load has that mass.
         """
-        from robots.bullet import Payload
+        from robots.simulated import Payload
 
         return self._send(Attach(Payload(mass=mass).mass))
 

@@ -26,10 +26,10 @@ from vrs.model import Array
 
 
 class WorldClosedError(VrsError):
-    """A PyBullet world used after it was closed."""
+    """A world of physics used after it was closed."""
 
     def __init__(self) -> None:
-        super().__init__("this PyBullet world is closed: make a new one")
+        super().__init__("this world of physics is closed: make a new one")
 
 
 class LostError(VrsError):
