@@ -96,7 +96,7 @@ RecordedRobot: TypeAlias = Annotated[
     str | None, option("--robot NAME|MODULE:NAME", "The robot that it's of, unless its name is known.")
 ]
 BodyName: TypeAlias = Annotated[
-    str, option("--body BODY", "What is real of an arm: bullet, ideal or another of its own.")
+    str, option("--body BODY", "What is real of the robot: bullet, mujoco, ideal or another of its own.")
 ]
 ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
 """Unless others are asked for."""

@@ -218,9 +218,10 @@ def test_the_death_of_the_parent_ends_it() -> None:
     assert ended(pid)
 
 
-def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock) -> None:
+@pytest.mark.parametrize("body", ["bullet", "mujoco"])
+def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock, body: str) -> None:
     timeline = motion(1)
-    with PhysicsProcess(configured(body="bullet"), clock) as physics:
+    with PhysicsProcess(configured(body=body), clock) as physics:
         ready = next(
             e
             for e in wait(physics, clock, lambda e: isinstance(e, PhysicsReady), 60.0)
