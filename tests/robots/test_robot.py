@@ -63,7 +63,7 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     assert robot.usual_body == "bullet"
     assert robot.body() is robot.bodies["bullet"]
     assert Robot("bare", robot.model).usual_body == IDEAL
-    with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, mujoco, ideal; given: 'jelly'"):
+    with pytest.raises(InvalidValueError, match="puma560 must be one of bullet, mujoco, ideal; given: 'jelly'"):
         robot.body("jelly")
     assert robot.with_body("mujoco").usual_body == "mujoco"
     assert robot.with_body(EXACT).body() is robot.body(IDEAL)
