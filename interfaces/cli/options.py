@@ -9,12 +9,14 @@ import re
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
+from interfaces.system import on_signal
 from robots.robot import FOUND, USUAL, HeadCamera, load
 from vrs.errors import FormatError, InvalidValueError
 
@@ -425,6 +427,14 @@ def end_with_input(ended: asyncio.Event) -> None:
     except PermissionError:
         # Files and /dev/null can't be waited for: there's always something to read, or the end.
         ended.set()
+    except NotImplementedError:
+        # Loops of some systems wait for sockets alone.
+        def wait() -> None:
+            while os.read(source, 4096):
+                pass
+            loop.call_soon_threadsafe(ended.set)
+
+        threading.Thread(target=wait, daemon=True).start()
 
 
 def end_on_signal(ended: asyncio.Event) -> None:
@@ -433,7 +443,7 @@ def end_on_signal(ended: asyncio.Event) -> None:
 
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
+        on_signal(loop, number, ended.set)
 
 
 ROUNDS = 2000
