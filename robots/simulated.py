@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from operator import truediv
 from typing import Annotated, Final, Protocol
 
@@ -123,7 +124,9 @@ class RigidChain(Protocol):
 
 
 WORLDS: Final[dict[str, Callable[..., RigidChain]]] = {"bullet": BulletChain, "mujoco": MujocoChain}
-"""Makers of chains, by the names of bodies."""
+"""Makers of chains, by the names of bodies; the usual one first, PyBullet where it's installed."""
+if find_spec("pybullet") is None:
+    WORLDS["bullet"] = WORLDS.pop("bullet")
 _BOUNDS: Final = (1e3, 1e3, 1e5)
 _CREEP: Final = 0.01
 """Joint speed below which the Coulomb compensation fades out [rad/s], [m/s]."""

@@ -21,7 +21,7 @@ from typing_extensions import override
 from robots.bullet.rooms import Block, Column, Room
 from robots.robot import Closing
 from robots.solids import LinkShape
-from vrs.errors import VrsError
+from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
 
@@ -50,6 +50,8 @@ def load_pybullet() -> Any:
         with open(os.devnull, "wb") as sink:
             os.dup2(sink.fileno(), 2)
         import pybullet
+    except ImportError:
+        raise InvalidValueError("body", "bullet", "with PyBullet installed: pip install pybullet") from None
     finally:
         os.dup2(saved, 2)
         os.close(saved)
