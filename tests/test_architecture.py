@@ -21,8 +21,8 @@ STRANGE = {"examples", "tests", "benchmarks"}
 ORDER = (
     "vrs",
     # The robots.
-    "robots.solids", "robots.base", "robots.robot", "robots.description", "robots.bullet", "robots.onboard", "robots.mobile",
-    "robots.ipr", "robots.puma560", "robots.cubo", "robots",
+    "robots.solids", "robots.base", "robots.robot", "robots.description", "robots.bullet", "robots.onboard",
+    "robots.mobile", "robots.described", "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.timer", "interfaces.messages",
     # The network; what is asked of a personal robot.
@@ -37,7 +37,18 @@ ORDER = (
 )
 # fmt: on
 """The rooms, folders and files, in their order: each imports only itself and what stands before it."""
-HEAVY = {"pybullet", "pybullet_data", "pybullet_utils", "roboticstoolbox", "spatialmath", "trimesh", "matplotlib"}
+HEAVY = {
+    "mujoco",
+    "yourdfpy",
+    "collada",
+    "pybullet",
+    "pybullet_data",
+    "pybullet_utils",
+    "roboticstoolbox",
+    "spatialmath",
+    "trimesh",
+    "matplotlib",
+}
 NUMPY = 0.15
 """What importing NumPy takes on a machine of usual pace [s]."""
 SOCKETS = {"socket", "socketserver", "asyncio", "ssl", "http", "urllib", "selectors"}
