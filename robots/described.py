@@ -105,6 +105,7 @@ def described(what: str) -> DescribedRobot:
         Appearance(lambda: shapes, model.links) if shapes else None,
         arm_bodies(whole),
         () if whole.point is None else (Gripper(whole.point),),
+        tuple(joint.name for joint in whole.chain(whole.tip) if joint.moves),
         f"{path}{TIP}{tip}" if tip else str(path),
     )
     return DescribedRobot(robot, whole, whole.notes, tuple(lines_to_state(description, whole)), file)
@@ -131,7 +132,7 @@ def _differential(name: str, given: BaseNumbers, found_by: str) -> DescribedRobo
     made = differential.differential(name, given)
     body = made.model.body
     laser = LaserModel(forward=0.0, height=min(max(0.8 * body.height, 0.02), 1.0))
-    robot = Robot(name, made.model, None, made.bodies(), (laser,), found_by)
+    robot = Robot(name, made.model, None, made.bodies(), (laser,), found_by=found_by)
     lines = tuple(differential.lines_to_state(given))
     said = f"Not said, so assumed: {', '.join(lines)}."
     return DescribedRobot(robot, None, (said,) if lines else (), lines)

@@ -217,6 +217,8 @@ class Robot:
     `robots.mobile.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
     devices: tuple[object, ...] = ()
     """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
+    joints: tuple[str, ...] = ()
+    """Names of an arm's joints, where they have any beside their numbers."""
     found_by: str = ""
     """What `load` finds it by, so that other processes can; empty for one that was made up on the spot."""
 

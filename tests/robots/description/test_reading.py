@@ -9,61 +9,37 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import pybullet_data
 import pytest
-import rtbdata
 import yourdfpy
 
 from robots import load
 from robots.described import described
 from robots.description import meshes
-from robots.description.assumptions import completed
 from robots.description.description import Description, JointKind
 from robots.description.reading import read
 from robots.description.tips import tip_of
 from robots.description.wheels import placed
+from tests.robots.description import tried
 from tests.robots.description.stranger import URDF, write
+from tests.robots.description.tried import BULLET, TOOLBOX
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 
-BULLET, TOOLBOX = Path(pybullet_data.getDataPath()), Path(rtbdata.__file__).parent / "xacro"
-ARMS = {
-    "kuka_iiwa/model.urdf": ("lbr_iiwa_link_7", 7),
-    "franka_panda/panda.urdf": ("panda_hand", 7),
-    "xarm/xarm6_with_gripper.urdf": ("xarm_gripper_base_link", 6),
-    "cartpole.urdf": ("pole", 2),
-    "mjcf/pusher.xml": ("fingertip", 7),
-}
-FOLDERS = {
-    "unimation_puma560_description/urdf/puma560_robot.urdf": ("link7", 6),
-    "unimation_puma560_description/urdf/puma560_robot.urdf.xacro": ("link7", 6),
-    "lynxmotion_al5d_description/urdf/al5d_robot.urdf": ("link4", 4),
-    "kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.xacro": ("tool0", 7),
-    "trossen_descriptions/urdf/px100.urdf.xacro": ("/ee_arm_link", 4),
-    "abb_irb140_description/urdf/irb140.xacro": ("tool0", 6),
-}
+
+def test_the_table_of_robots_that_were_tried_is_what_they_give() -> None:
+    assert tried.page() == tried.PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("path", "tip", "joints"),
-    [(BULLET / name, *found) for name, found in ARMS.items()]
-    + [(TOOLBOX / name, *found) for name, found in FOLDERS.items()],
-    ids=lambda value: value.name if isinstance(value, Path) else None,
-)
-def test_robots_of_pybullet_and_the_toolbox_are_read_whole(path: Path, tip: str, joints: int) -> None:
-    description = read(path)
-    whole = completed(description)
-    assert whole.tip == tip
-    moving = [joint for joint in whole.chain(tip) if joint.moves]
-    assert len(moving) == joints
-    for joint in moving:
-        assert joint.q_min is not None
-        assert joint.q_max is not None
-        assert joint.q_min < joint.q_max
-        assert min(joint.qd_max or 0, joint.qdd_max or 0, joint.qddd_max or 0) > 0
-    assert not [note for note in whole.notes if "wasn't found" in note or "can't be read" in note]
-    assert sum(len(link.shapes) for link in whole.links.values()) > joints // 2
+@pytest.mark.parametrize("path", tried.ROBOTS.values(), ids=tried.ROBOTS.keys())
+def test_robots_of_pybullet_and_the_toolbox_are_read_whole(path: Path) -> None:
+    found = tried.examined(path)
+    whole = found.description
+    assert whole is not None
+    assert not [note for note in found.notes if "wasn't found" in note or "can't be read" in note]
+    assert sum(len(link.shapes) for link in whole.links.values()) >= len(whole.links) // 2
     assert max(len(shape.faces) for link in whole.links.values() for shape in link.shapes) <= meshes.MOST_TRIANGLES
+    if found.robot.is_base:
+        return
     for link in whole.links.values():
         if link.mass and link.name != whole.root:
             moments = np.linalg.eigvalsh(link.inertia)
