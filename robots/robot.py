@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,7 +45,12 @@ IDEAL: Final = "ideal"
 """Body of any arm: it's where its reference is."""
 EXACT: Final = "exact"
 """The same by the name that it had before."""
-_FILES: Final = frozenset((".urdf", ".xacro", ".xml", ".mjcf"))
+FILES: Final = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
+"""Endings of files that robots are read from."""
+NUMBERS: Final = "diff:"
+"""What a mobile robot in numbers begins with."""
+_DESCRIBED: Final = "robots.described"
+"""What reads them; it stands after this module, and is loaded when it's needed."""
 
 
 class Closing:
@@ -212,6 +217,8 @@ class Robot:
     `robots.mobile.robot.MobileRobot` in a room, with the rng, limits and senses that it's given."""
     devices: tuple[object, ...] = ()
     """What it carries: `Gripper`, `Display`, `HeadCamera`, `ThinClient`, `robots.onboard.laser.LaserModel`."""
+    joints: tuple[str, ...] = ()
+    """Names of an arm's joints, where they have any beside their numbers."""
     found_by: str = ""
     """What `load` finds it by, so that other processes can; empty for one that was made up on the spot."""
 
@@ -219,6 +226,11 @@ class Robot:
     def is_base(self) -> bool:
         """Whether it's a mobile robot, and no arm."""
         return isinstance(self.model, MobileBase)
+
+    @property
+    def recorded_by(self) -> str:
+        """What recordings have to find it by, beside its name: that of a file or numbers, else nothing."""
+        return self.found_by if described(self.found_by) else ""
 
     @property
     def arm(self) -> RobotModel:
@@ -308,21 +320,22 @@ def load(what: str) -> Robot:
     """Find a robot.
 
     Args:
-        what: Its name (see `names`), or `MODULE:NAME` of a `Robot` of one's own; the module may lie in the working
-            directory.
+        what: Its name (see `names`); a URDF, xacro or MJCF file, with `#LINK` after it for the link at the end of
+            its arm; a TOML file of a mobile robot's numbers, or those as `diff:wheelbase=0.4,wheel=0.1`; or
+            `MODULE:NAME` of a `Robot` of one's own, whose module may lie in the working directory.
 
     Raises:
         InvalidValueError: If there's no such robot, or what is there isn't one.
-        FormatError: If its module can't be imported.
+        FormatError: If its file can't be read, or its module can't be imported.
     """
+    if described(what):
+        return cast("Robot", importlib.import_module(_DESCRIBED).robot_of(what))
     where, colon, name = what.partition(":")
     own = bool(colon and where and name.isidentifier())
     point = next((point for point in added() if point.name == what), None)
     reference = what if own else FOUND.get(what) or (None if point is None else point.value)
     if reference is None:
-        allowed = f"one of {', '.join(names())}, or MODULE:NAME of your own"
-        if Path(what).suffix.lower() in _FILES or os.sep in what:
-            allowed += "; robots aren't read from files yet"
+        allowed = f"one of {', '.join(names())}, a file ({', '.join(FILES)}), diff:…, or MODULE:NAME of your own"
         raise InvalidValueError("robot", what, allowed, did_you_mean(what, names()))
     where, _, name = reference.partition(":")
     if own and os.getcwd() not in sys.path:
@@ -337,6 +350,12 @@ def load(what: str) -> Robot:
         there = ", ".join(sorted(key for key, value in vars(module).items() if isinstance(value, Robot))) or "none"
         raise InvalidValueError(f"robot in {where}", name, f"a Robot there ({there})")
     return replace(robot, found_by=what)
+
+
+def described(what: str) -> bool:
+    """Whether a robot that's asked for is one of numbers or of a file, be it there or not."""
+    ends = {Path(part).suffix.lower() for part in (what, what.rpartition("#")[0])}
+    return what.startswith(NUMBERS) or not ends.isdisjoint(FILES)
 
 
 @lru_cache(maxsize=1)

@@ -22,7 +22,7 @@ ORDER = (
     "vrs",
     # The robots.
     "robots.solids", "robots.base", "robots.robot", "robots.chain", "robots.description", "robots.bullet",
-    "robots.mujoco", "robots.drives", "robots.onboard", "robots.simulated", "robots.mobile",
+    "robots.mujoco", "robots.drives", "robots.onboard", "robots.simulated", "robots.mobile", "robots.described",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.pipes", "interfaces.timer", "interfaces.messages",
@@ -39,9 +39,10 @@ ORDER = (
 # fmt: on
 """The rooms, folders and files, in their order: each imports only itself and what stands before it."""
 HEAVY = {
-    "pybullet",
     "mujoco",
     "yourdfpy",
+    "collada",
+    "pybullet",
     "pybullet_data",
     "pybullet_utils",
     "roboticstoolbox",

@@ -1,4 +1,4 @@
-"""`vrs check`: what is wrong with a VAL-II program, before it runs."""
+"""`vrs check`: what is wrong with a VAL-II program, before it runs; what a robot's description leaves out."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from interfaces.cli.options import (
     DialectName,
     ProgramFiles,
     RobotName,
+    Tip,
     argument,
     dialect_of,
+    left_out,
     option,
     program_files,
     val_robot,
 )
 from interfaces.cli.run import text_of
-from robots.robot import USUAL
+from robots.robot import USUAL, described
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -31,23 +33,37 @@ if TYPE_CHECKING:
 
 _Found: TypeAlias = "tuple[Path, CheckFinding]"
 """What was found, and in which file."""
+OF_PROGRAMS = ("program", "static", "robot", "dialect", "files")
+"""Options that only programs have, by their names without dashes."""
 SUFFERED = 2
 """Exit code for a program that is wrong."""
 
 
 def check(
-    programs: Annotated[list[Path], argument("PROGRAM.v2", "Files of VAL-II programs and values.")],
+    ctx: typer.Context,
+    programs: Annotated[
+        list[Path],
+        argument("PROGRAM.v2|ROBOT", "Files of VAL-II programs and values; or of robots: URDF, xacro, MJCF, TOML."),
+    ],
     program: Annotated[str, option("NAME", "Which program is planned; the first unless given.")] = "",
     static: Annotated[bool, option("--static", "Only read the programs; don't plan what one would do.")] = False,
     name: RobotName = USUAL,
+    tip: Tip = "",
     dialect: DialectName = "",
     files: ProgramFiles = None,
     as_json: Annotated[bool, option("--json", "Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
 
-    Exits 2 when there's an error; warnings alone don't count.
+    Exits 2 when there's an error; warnings alone don't count. Of descriptions of robots: links, joints, limits, the
+    tip, what is assumed and how it's stated.
     """
+    if any(described(str(path)) for path in programs):
+        from interfaces.cli.check_robot import check_robots
+
+        left_out(ctx, "descriptions of robots have nothing of the kind", OF_PROGRAMS)
+        check_robots([str(path) for path in programs], tip, as_json=as_json)
+        return 0
     from interfaces.val2.check import check_files
 
     checked = check_files([(text_of(path), path.name) for path in programs], dialect_of(dialect))
@@ -55,7 +71,7 @@ def check(
     sources = [source for source, _ in checked if source is not None]
     if not static and len(sources) == len(programs) and not _wrong(_of(found, sources, program)):
         found += _rehearsed(
-            dict(zip(programs, sources, strict=True)), program, val_robot(name).arm, program_files(files)
+            dict(zip(programs, sources, strict=True)), program, val_robot(name, tip).arm, program_files(files)
         )
     found = _once(found)
     if as_json:

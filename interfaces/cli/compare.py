@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
+from interfaces.cli.options import RecordedRobot, Tip, argument, option, recorded_robot
 from interfaces.report.tables import FIGURES, shown, table_of
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def compare(
     recording: Annotated[Path, argument("RUN.mcap", "A recording.")],
     other: Annotated[Path | None, argument("OTHER.mcap", "Another to set beside it.")] = None,
     name: RecordedRobot = None,
+    tip: Tip = "",
     as_json: Annotated[bool, option("--json", "Write the figures as JSON on standard output.")] = False,
 ) -> None:
     """Say how far apart the twins of a recording were, and why.
@@ -59,7 +60,7 @@ def compare(
     from interfaces.recording.recording import check_alike, open_recording
     from interfaces.runs.summary import to_json
 
-    robot = recorded_robot(name)
+    robot = recorded_robot(name, tip)
     with ExitStack() as stack:
         paths = [path for path in (recording, other) if path is not None]
         opened = [stack.enter_context(open_recording(path, robot)) for path in paths]

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, dialect_of, option, program_files, val_robot
+from interfaces.cli.options import DialectName, RobotName, Tip, dialect_of, option, program_files, val_robot
 from interfaces.system import module_process, on_signal, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
@@ -42,6 +42,7 @@ def console(
     token_file: Annotated[Path | None, option("FILE", "Tokens of that server.")] = None,
     alone: Annotated[bool, option("--alone", "A virtual arm in this process only: no real one, no page.")] = False,
     name: RobotName = USUAL,
+    tip: Tip = "",
     delay: Annotated[str, option("PROFILE", "Emulated on the way to the robot that this begins.")] = "none",
     files: Annotated[
         Path | None,
@@ -60,7 +61,7 @@ def console(
         raise InvalidValueError("delay", delay, "left out with --connect and --alone: no robot is begun here")
     if name != USUAL and connect is not None:
         raise InvalidValueError("robot", name, "left out with --connect: the server has its own")
-    robot = val_robot(name)
+    robot = val_robot(name, tip)
     program_files(files)
     delay_profile(delay)
     spoken = dialect_of(dialect)
@@ -70,7 +71,7 @@ def console(
         _connected(connect, token_file, files, spoken)
     else:
         typer.echo("vrs: starting both robots ..", err=True)
-        with local_server(["--robot", name, "--delay", delay, "--link-loss", "hold"]) as url:
+        with local_server(["--robot", robot.found_by, "--delay", delay, "--link-loss", "hold"]) as url:
             typer.echo(f"vrs: {url}/view shows both robots", err=True)
             _connected(url, None, files, spoken)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import RecordedRobot, argument, option, recorded_robot
+from interfaces.cli.options import RecordedRobot, Tip, argument, option, recorded_robot
 from interfaces.system import written
 from vrs.errors import InvalidValueError
 
@@ -23,6 +23,7 @@ def export(
     ] = None,
     to_report: Annotated[Path | None, option("--report FILE.html", "Write its report there.")] = None,
     name: RecordedRobot = None,
+    tip: Tip = "",
 ) -> None:
     """Write a recording as tables (units are in the columns' names), or as the report of its run."""
     from interfaces.recording.export import tables, write_csv, write_parquet
@@ -31,7 +32,7 @@ def export(
     if to_csv is None and to_parquet is None and to_report is None:
         raise InvalidValueError("export", "nothing", "one or more of --csv DIR, --parquet DIR, --report FILE.html")
     written: list[Path] = []
-    with open_recording(recording, recorded_robot(name)) as opened:
+    with open_recording(recording, recorded_robot(name, tip)) as opened:
         if opened.damage and to_report is None:
             typer.echo(f"vrs: {recording.name}: the recording is damaged: {opened.damage}", err=True)
         found = () if to_csv is None and to_parquet is None else tables(opened)

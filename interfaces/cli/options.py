@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 import typer
 
 from interfaces.system import on_signal
-from robots.robot import FOUND, USUAL, HeadCamera, load
+from robots.robot import FOUND, USUAL, HeadCamera, described, load
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -81,21 +81,28 @@ ProgramFiles: TypeAlias = Annotated[
 ]
 VAL_JOINTS = 6
 """Joints that VAL-II's places have."""
+_ROBOTS: Final = "NAME|FILE|MODULE:NAME"
+_ROBOTS_ARE: Final = (
+    f"{', '.join(FOUND)}, one that a package adds, a description (URDF, xacro, MJCF), a mobile robot's numbers "
+    "(TOML, or diff:wheelbase=0.4,wheel=0.1), or MODULE:NAME of your own"
+)
 RobotName: TypeAlias = Annotated[
     str,
-    option("--robot NAME|MODULE:NAME", f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own."),
+    option(f"--robot {_ROBOTS}", f"{_ROBOTS_ARE}."),
 ]
 RobotNames: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
         "--robot",
-        metavar="NAME|MODULE:NAME",
-        help=f"{', '.join(FOUND)}, one that a package adds, or MODULE:NAME of your own; repeated, several in one "
-        f"world. Unless given, {USUAL}.",
+        metavar=_ROBOTS,
+        help=f"{_ROBOTS_ARE}; repeated, several in one world. Unless given, {USUAL}.",
     ),
 ]
 RecordedRobot: TypeAlias = Annotated[
-    str | None, option("--robot NAME|MODULE:NAME", "The robot that it's of, unless its name is known.")
+    str | None, option(f"--robot {_ROBOTS}", "The robot that it's of, unless its name or its file is known.")
+]
+Tip: TypeAlias = Annotated[
+    str, option("--tip LINK", "Of a description: the link at the end of the arm; as FILE#LINK says it, too.")
 ]
 BodyName: TypeAlias = Annotated[
     str, option("--body BODY", "What is real of the robot: bullet, mujoco, ideal or another of its own.")
@@ -145,9 +152,23 @@ _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECAS
 """What a request's Host is made of."""
 
 
-def recorded_robot(name: str | None) -> Robot | None:
-    """The robot that `RecordedRobot` asks for, if it does."""
-    return None if name is None else load(name)
+def robot_of(name: str, tip: str = "") -> Robot:
+    """The robot that `--robot` and `--tip` ask for.
+
+    Raises:
+        InvalidValueError: If there's none, or no such tip.
+        FormatError: If its file can't be read.
+    """
+    if tip and not described(name):
+        raise InvalidValueError("tip", tip, "left out: only a robot of a description has one")
+    return load(f"{name}#{tip}" if tip else name)
+
+
+def recorded_robot(name: str | None, tip: str = "") -> Robot | None:
+    """The robot that `RecordedRobot` asks for, if it does; errors as of `robot_of`."""
+    if name is None and tip:
+        raise InvalidValueError("tip", tip, "left out without --robot")
+    return None if name is None else robot_of(name, tip)
 
 
 def speaks_val(robot: Robot) -> bool:
@@ -155,13 +176,13 @@ def speaks_val(robot: Robot) -> bool:
     return not robot.is_base and robot.arm.limits.dof == VAL_JOINTS and not robot.arm.prismatic
 
 
-def val_robot(name: str) -> Robot:
+def val_robot(name: str, tip: str = "") -> Robot:
     """A robot for VAL-II.
 
     Raises:
         InvalidValueError: If there's none of that name, or VAL-II has no places for it.
     """
-    robot = load(name)
+    robot = robot_of(name, tip)
     if not speaks_val(robot):
         raise InvalidValueError("robot", name, f"an arm of {VAL_JOINTS} joints that turn, as VAL-II has places for")
     return robot

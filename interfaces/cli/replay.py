@@ -14,6 +14,7 @@ from interfaces.cli.options import (
     Port,
     ReachedAs,
     RecordedRobot,
+    Tip,
     TokenFile,
     access_for,
     argument,
@@ -56,6 +57,7 @@ def replay(
         bool, option("--commands", "Run the commands again on a fresh engine: is the timeline the same?")
     ] = False,
     name: RecordedRobot = None,
+    tip: Tip = "",
     host: Host = "127.0.0.1",
     port: Port = 8610,
     token_file: TokenFile = None,
@@ -78,7 +80,7 @@ def replay(
         raise InvalidValueError("json", "--json", "with --headless or --commands")
     from interfaces.stream.access import OPEN
 
-    robot = recorded_robot(name)
+    robot = recorded_robot(name, tip)
     access, allowed = access_for(host, token_file, free=OPEN), asked_for(host, reached_as or ())
     with ExitStack() as stack:
         paths = [path for path in (run, other) if path is not None]

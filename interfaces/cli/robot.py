@@ -22,6 +22,7 @@ from interfaces.cli.options import (
     ReachedAs,
     RobotName,
     RoomName,
+    Tip,
     TokenFile,
     access_for,
     asked_for,
@@ -31,6 +32,7 @@ from interfaces.cli.options import (
     keep_quiet,
     left_out,
     option,
+    robot_of,
     room_of,
     saying_policy,
     tokens_for,
@@ -150,6 +152,7 @@ def robot(
         str, option("HOST:PORT", "Where an operator's site connects; port 0 for any.")
     ] = "127.0.0.1:8601",
     name: RobotName = USUAL,
+    tip: Tip = "",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     offset: Annotated[
@@ -198,7 +201,7 @@ def robot(
 
     number_in("timeout", timeout, 0.1, 2.0, unit=" s")
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    chosen = load(name)
+    chosen = robot_of(name, tip)
     check_taken([chosen], ctx)
     address = parse_address("--listen", listen)
     policy = LossPolicy(one_of("link-loss", link_loss, LossPolicy))

@@ -26,6 +26,7 @@ from interfaces.cli.options import (
     Out,
     ProgramFiles,
     RobotName,
+    Tip,
     argument,
     dialect_of,
     option,
@@ -46,6 +47,7 @@ def run(
     programs: Annotated[list[Path], argument("PROGRAM.v2", "Files of VAL-II programs and values.")],
     program: Annotated[str, option("NAME", "Which program is run; the first unless given.")] = "",
     name: RobotName = USUAL,
+    tip: Tip = "",
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
@@ -72,7 +74,7 @@ def run(
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name)
+    source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name, tip)
     directory, corrected = program_files(files), None if corrections is None else read_corrections(corrections)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)

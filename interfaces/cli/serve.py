@@ -26,6 +26,7 @@ from interfaces.cli.options import (
     ReachedAs,
     RobotNames,
     RoomName,
+    Tip,
     TokenFile,
     abandon,
     access_for,
@@ -38,6 +39,7 @@ from interfaces.cli.options import (
     keep_quiet,
     left_out,
     option,
+    robot_of,
     room_of,
     say_lost,
     say_robot,
@@ -47,7 +49,7 @@ from interfaces.cli.options import (
     untaken,
 )
 from interfaces.system import run_loop, software
-from robots.robot import USUAL, HeadCamera, load
+from robots.robot import USUAL, HeadCamera
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 
@@ -72,6 +74,7 @@ def serve(
     host: Host = "127.0.0.1",
     port: Port = 8600,
     names: RobotNames = None,
+    tip: Tip = "",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
     camera: Annotated[
@@ -151,7 +154,9 @@ def serve(
     from robots.onboard.watchdog import LossPolicy
 
     names = names or [USUAL]
-    robots = [load(name) for name in names]
+    if tip and len(names) > 1:
+        raise InvalidValueError("tip", tip, "left out of several robots: FILE#LINK says it of each")
+    robots = [robot_of(name, tip) for name in names]
     if len({robot.name for robot in robots}) < len(robots):
         raise InvalidValueError("robot", ", ".join(names), "each robot once")
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
@@ -209,11 +214,15 @@ def serve(
     access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []
-    for k, (robot, name, path) in enumerate(zip(robots, names, records, strict=True)):
+    for k, (robot, path) in enumerate(zip(robots, records, strict=True)):
         kept = {option: value for option, value in given.items() if option not in untaken(robot)}
         if record is not None and not robot.is_base:
             kept["reports"] = f"{RATE:g}"
-        options = ["--robot", name, *(word for option, value in kept.items() for word in (f"--{option}", value))]
+        options = [
+            "--robot",
+            robot.found_by,
+            *(word for option, value in kept.items() for word in (f"--{option}", value)),
+        ]
         eye = camera if robot.device(HeadCamera) else 0.0
         folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
         serving.append(_Serving(
@@ -277,6 +286,7 @@ class _Serving:
             failed=lambda problem: typer.echo(f"vrs: {problem}", err=True),
             over=over,
             robot=self.robot.name,
+            found_by=self.robot.recorded_by,
             room=self.room,
             architecture=self.architecture if self.robot_at is None else OWN,
         )

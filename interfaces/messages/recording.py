@@ -272,6 +272,8 @@ class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_on
     """How the engine stood; None where nothing had been commanded yet."""
     drive: DriveFacts | None = None
     """How a mobile robot's run was set up; None of an arm."""
+    found_by: Text = ""
+    """What finds the robot where that's a file or numbers; empty of one that its name finds."""
 
 
 class Drop(Record, frozen=True, omit_defaults=True, gc=False):

@@ -68,6 +68,8 @@ class LiveRecording:
     """Whether a file that's there already is written over."""
     robot: str = ""
     """Name of a mobile robot, which its model's needn't be; the model's unless given."""
+    found_by: str = ""
+    """What finds the robot where that's a file or numbers."""
     room: Room | None = None
     """Where a mobile robot drives."""
     architecture: str = OWN
@@ -126,6 +128,7 @@ class LiveRecorder(Capture):
             sampled=PERIOD if drives is None else None,
             late=late_of(self.late),
             drive=None if drives is None else drives.facts(what.robot or name, what.architecture),
+            found_by=fields.text(what.found_by),
         )
         self.recorder: Recorder | None = None
         """Writes the file, once there is one."""

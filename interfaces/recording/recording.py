@@ -33,7 +33,7 @@ from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEd
 from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, Damage, FileSource
 from interfaces.recording.track import Log, SampleTrack, Tracks
-from robots.robot import BARE, Robot, load, names
+from robots.robot import BARE, Robot, described, load, names
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
@@ -158,8 +158,8 @@ class Recording:
         # Mobile robots of one family have its name as their model's, and a name of their own.
         name = begin.robot if begin.drive is None or begin.drive.body == BARE else begin.drive.body
         robot = self._robot
-        if (robot is None or robot.name != name) and name in names():
-            robot = load(name)
+        if robot is None or robot.name != name:
+            robot = self._found(name, begin.found_by)
         if robot is None or robot.name != name:
             raise FormatError(
                 str(self.path), f"of a robot that isn't known here: {name!r}; --robot says where it is"
@@ -168,6 +168,22 @@ class Recording:
         if len(begin.q) != numbers:
             raise FormatError(str(self.path), f"of a {name!r} with {len(begin.q)} numbers to say where it is")
         return robot
+
+    def _found(self, name: str, found_by: str) -> Robot | None:
+        """The robot of a file or of numbers, or of a name; None where nothing here has it.
+
+        No module is imported because a recording says so.
+
+        Raises:
+            FormatError: If its file is gone, or can't be read any more.
+        """
+        if not described(found_by):
+            return load(name) if name in names() else None
+        try:
+            return load(found_by)
+        except (FormatError, InvalidValueError) as error:
+            said = f"of {name!r}, a robot that was read from a file: {error}; --robot says where it is"
+            raise FormatError(str(self.path), said) from None
 
     @cached_property
     def model(self) -> Any:

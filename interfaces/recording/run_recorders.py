@@ -280,6 +280,7 @@ class DriveRecorder(_FileRecorder, Witness):
                 position=case.position,
                 grid=None if self._grid is None else grid_facts(self._grid),
             ),
+            found_by=text(case.real[0].recorded_by),
         )
 
     def _add_samples(self, drive: DriveRun) -> None:

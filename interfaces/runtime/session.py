@@ -116,6 +116,7 @@ class TwinSession:
             t=0.0, robot=robot.name, driver="laboratory", title=text(title), seed=seed,
             delay=text(link.delay.name), offset=spelled(offset), service=str(link.service), link_loss=LINK_LOSS,
             step=STEP, q=start.tolist(), lateness=Lateness.POSTPONE.value, software=software(),
+            found_by=text(robot.recorded_by),
         )  # fmt: skip
         self._keeper = keeper
         if keeper is not None:

@@ -90,6 +90,7 @@ def described(robot: Robot) -> dict[str, Any]:
         "home": [X.T.ravel().tolist() for X in home],
         "screws": S.tolist(),
         "tool": list(robot.tool),
+        "joints": list(robot.joints),
         "tool_speed": robot.arm.tool_speed,
         "tool_turn_speed": robot.arm.tool_turn_speed,
     }

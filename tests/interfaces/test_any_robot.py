@@ -244,7 +244,9 @@ def test_its_report_draws_a_robot_without_shapes(demo: Path, new_page: Any) -> N
         (("demo", "--robot", "ipr"), "an arm; this one is a mobile robot"),
         (("lab", "--robot", ARM, "--out", "."), "a mobile robot; this one is an arm"),
         (("demo", "--robot", "tests.interfaces.own_arm:Crane"), "a Robot there (ROBOT)"),
-        (("demo", "--robot", "crane.urdf"), "aren't read from files yet"),
+        (("demo", "--robot", "crane.urdf"), "crane.urdf: there's no such file"),
+        (("demo", "--robot", ARM, "--tip", "hook"), "only a robot of a description has one"),
+        (("serve", "--robot", "diff:wheelbase=0.4"), "with at least wheelbase and wheel"),
     ],
 )
 def test_doors_say_which_robots_they_take(

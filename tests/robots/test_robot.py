@@ -100,11 +100,16 @@ def test_entry_points_add_names_and_replace_none(monkeypatch: pytest.MonkeyPatch
     assert robots.load("ipr").name == "ipr"
 
 
-@pytest.mark.parametrize("what", ["r2d2", "", ":", "a:", ":b", "robots/arm.py", "arm.urdf", "arm.XACRO", "a:b c"])
+@pytest.mark.parametrize("what", ["r2d2", "", ":", "a:", ":b", "robots/arm.py", "a:b c"])
 def test_an_error_says_what_is_allowed(what: str) -> None:
-    with pytest.raises(InvalidValueError, match=r"one of puma560, ipr, micro, cubo.*, or MODULE:NAME") as error:
+    with pytest.raises(InvalidValueError, match=r"one of puma560, ipr, micro, cubo.*\.urdf, .*, or MODULE:NAME"):
         robots.load(what)
-    assert ("aren't read from files yet" in str(error.value)) == ("/" in what or what.startswith("arm"))
+
+
+@pytest.mark.parametrize("what", ["arm.urdf", "arm.XACRO", "an arm.xml#hand", "base.toml"])
+def test_a_file_that_is_not_there_is_named(what: str) -> None:
+    with pytest.raises(FormatError, match=rf"{what.partition('#')[0]}: (there's no such file|can't be read)"):
+        robots.load(what)
 
 
 def test_nothing_heavy_is_loaded_before_a_body_or_a_shape_is_made() -> None:

@@ -234,7 +234,7 @@ def rich_table(rows: Sequence[Row]) -> RichTable:
     for group in groups:
         (path, late, speed), progress = map(group.median, SHOWN), group.median("progress")
         table.add_row(
-            *(group.key[k] for k in varying),
+            *(group.key[k].rpartition("/")[2] for k in varying),
             _said(path, 100),
             f"{100 * max(group.values('path_error_max')):.1f}",
             _said(late, 1, 2),

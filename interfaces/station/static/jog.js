@@ -112,7 +112,7 @@ function Joints({ station, dof, go }) {
       <span class="hint">keys Q to ${keyName(UP[last])} up, A to ${keyName(DOWN[last])} down${more}</span>
       <${Go} station=${station} kind="joints" go=${() => go("joints")}>Go<//></div>
     <div class="joints" role="group" aria-label="Joints">
-      ${fields.map((field, k) => html`<div class="joint"><span class="name">${field.name}</span>
+      ${fields.map((field, k) => html`<div class="joint"><span class="name" title=${field.called}>${field.name}</span>
         <${Jog} station=${station} what=${["joint", k, -1]} label=${`Joint ${k + 1} down`}>−<//>
         <${Slider} station=${station} k=${k} field=${field} go=${() => go("joints")} />
         <${Field} jog=${jog} kind="joints" k=${k} field=${field} label=${`Joint ${k + 1}`} go=${() => go("joints")}

@@ -136,16 +136,17 @@ export class Jogging {
     return timeline.joints(this.begin === "append" ? timeline.end : this.begin === "later" ? now + this.delay : now);
   }
 
-  /** Fields of the joints, or of the tool's pose: name, unit, the lowest and the highest value. */
+  /** Fields of the joints, or of the tool's pose: name, what the robot calls it, unit, lowest and highest value. */
   fields(kind) {
     if (kind === "pose") {
       return POSE.map((name, k) => ({ name, ...(k < 3 ? { sign: "mm", high: FARTHEST } : { sign: "°", high: FULL_TURN }) }))
         .map((field) => ({ ...field, low: -field.high }));
     }
     const { q_min: low, q_max: high } = this.session.welcome.limits;
+    const { joints } = this.station.config.robot;
     return low.map((_, k) => {
       const { scale, sign } = this.unit(k);
-      return { name: `J${k + 1}`, sign, low: low[k] * scale, high: high[k] * scale };
+      return { name: `J${k + 1}`, called: joints[k] ?? "", sign, low: low[k] * scale, high: high[k] * scale };
     });
   }
 

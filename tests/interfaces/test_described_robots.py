@@ -1,0 +1,160 @@
+"""Robots from descriptions go through every door that takes one, and recordings find theirs again."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pybullet_data
+import pytest
+
+from interfaces.cli.main import exit_status
+from interfaces.recording import open_recording
+from tests.interfaces.live_rig import child
+from tests.interfaces.station.opened import Page, station
+from tests.robots.description.stranger import write
+
+HUSKY = Path(pybullet_data.getDataPath()) / "husky" / "husky.urdf"
+DIFF = "diff:wheelbase=0.3,wheel=0.06,v=0.4"
+
+
+def vrs(*arguments: object, status: int = 0) -> str:
+    """What a command says on standard output; it ends as it should."""
+    said = StringIO()
+    with redirect_stdout(said):
+        assert exit_status([str(argument) for argument in arguments]) == status
+    return said.getvalue()
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A stranger's robot."""
+    return write(tmp_path_factory.mktemp("robot"))
+
+
+@pytest.fixture(scope="module")
+def demo(robot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a demo of it leaves, which was begun beside the file."""
+    out = tmp_path_factory.mktemp("demo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(robot.parent)
+        vrs("demo", "--robot", robot.name, "--delay", "wed", "--out", out)
+    return out
+
+
+def test_a_check_says_what_is_there_what_is_assumed_and_how_it_is_stated(robot: Path) -> None:
+    said = vrs("check", robot)
+    for words in (
+        "an arm of 4 joints that ends at palm",
+        "grip too mimics another: 1 × grip + 0",
+        "- upper: mesh my meshes/gone.dae wasn't found",
+        "my robot.vrs.toml:",
+        '    [joints."shoulder"]\n    acceleration = 8\n    jerk = 80\n',
+    ):
+        assert words in said
+    assert re.search(r"elbow +-180°\* +180°\* +57\.3°\*", said)
+    facts = json.loads(vrs("check", robot, "--json", "--tip", "lamp"))
+    assert (facts["kind"], facts["tip"], facts["driven"]) == ("arm", "lamp", ["pan", "tilt"])
+    assert {joint["name"]: joint["upper"] for joint in facts["joints"]}["grip"] == 0.03
+    husky = json.loads(vrs("check", HUSKY, "--json"))
+    assert (husky["kind"], husky["wheelbase_m"]) == ("mobile robot", pytest.approx(0.5708))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("check", "ROBOT", "--static"),
+            "static must be left out: descriptions of robots have nothing of the kind",
+        ),
+        (("check", "ROBOT", "other.v2"), "file must be a robot's, as the others are"),
+        (("check", "ROBOT", "--tip", "thumb"), "one of finger, other finger, lamp, or another link"),
+        (("demo", "--robot", "ROBOT", "--tip", "thumb", "--out", "."), "tip must be one of finger"),
+        (("serve", "--robot", "ROBOT", "--robot", "ipr", "--tip", "lamp"), "FILE#LINK says it of each"),
+        (("run", "any.v2", "--robot", "ROBOT"), "any.v2"),
+        (("console", "--robot", "ROBOT"), "an arm of 6 joints that turn"),
+        (("lab", "--robot", "ROBOT", "--out", "."), "a mobile robot; this one is an arm"),
+        (("demo", "--robot", str(HUSKY), "--out", "."), "an arm; this one is a mobile robot"),
+        (("replay", "a.mcap", "--tip", "lamp"), "tip must be left out without --robot"),
+    ],
+)
+def test_doors_say_what_they_take(
+    robot: Path, arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_status([str(robot) if word == "ROBOT" else word for word in arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_recording_knows_its_robot_by_the_file_and_runs_again(demo: Path) -> None:
+    recording = demo / "run.mcap"
+    summary = json.loads((demo / "summary.json").read_text())
+    assert [x is None for x in summary["errors"]["servo"]["joint_rms_deg"]] == [True, False, False, False]
+    assert vrs("compare", recording, "--json") == (demo / "summary.json").read_text()
+    assert "identical" in vrs("replay", recording, "--commands")
+    frame = json.loads(vrs("replay", recording, "--headless", "--at", "5", "--json"))
+    assert frame
+
+
+def test_a_recording_says_when_its_file_is_gone_and_takes_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path)
+    (tmp_path / "plan.jsonl").write_text('{"issue": 0.0, "execute": 0.5, "move": [20, -30]}')
+    out = tmp_path / "out"
+    vrs(
+        "demo",
+        "--robot",
+        path,
+        "--tip",
+        "lamp",
+        "--commands",
+        tmp_path / "plan.jsonl",
+        "--delay",
+        "none",
+        "--out",
+        out,
+    )
+    assert "identical" in vrs("replay", out / "run.mcap", "--commands")
+    with open_recording(out / "run.mcap") as opened:
+        assert opened.robot.found_by == f"{path}#lamp"
+    moved = tmp_path / "elsewhere"
+    shutil.move(tmp_path / "strange things", moved)
+    vrs("replay", out / "run.mcap", "--commands", status=2)
+    error = capsys.readouterr().err
+    assert f"{path}: there's no such file; --robot says where it is" in error
+    there = moved / "robots" / path.name
+    assert "identical" in vrs("replay", out / "run.mcap", "--commands", "--robot", there, "--tip", "lamp")
+
+
+def test_bases_drive_in_the_laboratory_and_their_recordings_play(tmp_path: Path) -> None:
+    vrs(
+        "lab", "--robot", DIFF, "--robot", HUSKY, "--operator", "slalom", "--architecture", "timeline", "--runs", 1,
+        "--length", 6, "--workers", 1, "--record", "--out", tmp_path,
+    )  # fmt: skip
+    recordings = sorted((tmp_path / "runs").glob("*.mcap"))
+    assert len(recordings) == 2
+    names = set()
+    for recording in recordings:
+        assert vrs("replay", recording, "--headless", "--at", "3", "--json")
+        with open_recording(recording) as opened:
+            names.add(opened.robot.name)
+            assert opened.robot.shapes()
+    assert names == {"diff", "husky_robot"}
+
+
+def test_a_described_arm_is_served_with_its_shapes_and_the_names_of_its_joints(robot: Path, new_page: Any) -> None:
+    with child("serve", "--port", "0", "--robot", str(robot), "--link-loss", "hold") as server:
+        url = station(server)
+        page = Page(new_page(url, 1280, 800, "light", expected="WebSocket connection"), url).open()
+        page.take_control()
+        names = "[...document.querySelectorAll('.joint .name')].map((name) => name.title)"
+        assert page.get(names) == ["slide", "shoulder", "elbow", "roll"]
+        page.page.locator("button[aria-label='Joint 2 up']").click()
+        page.wait("station.session.timeline.joints(station.session.now)[1] > 0.001")

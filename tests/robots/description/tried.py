@@ -1,0 +1,81 @@
+"""The table of robots that were tried, in docs/howto/robot.md: `python -m tests.robots.description.tried`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import pybullet_data
+import rtbdata
+
+from robots.described import DescribedRobot, described
+
+BULLET, TOOLBOX = Path(pybullet_data.getDataPath()), Path(rtbdata.__file__).parent / "xacro"
+PAGE: Final = Path(__file__).parents[3] / "docs" / "howto" / "robot.md"
+ROBOTS: Final = {
+    "KUKA LBR iiwa": BULLET / "kuka_iiwa/model.urdf",
+    "Franka Panda": BULLET / "franka_panda/panda.urdf",
+    "xArm 6 with gripper": BULLET / "xarm/xarm6_with_gripper.urdf",
+    "cart-pole": BULLET / "cartpole.urdf",
+    "MuJoCo's pusher": BULLET / "mjcf/pusher.xml",
+    "Husky": BULLET / "husky/husky.urdf",
+    "PUMA 560": TOOLBOX / "unimation_puma560_description/urdf/puma560_robot.urdf",
+    "Lynxmotion AL5D": TOOLBOX / "lynxmotion_al5d_description/urdf/al5d_robot.urdf",
+    "KUKA LBR iiwa 14": TOOLBOX / "kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.xacro",
+    "Trossen PincherX 100": TOOLBOX / "trossen_descriptions/urdf/px100.urdf.xacro",
+    "ABB IRB 140": TOOLBOX / "abb_irb140_description/urdf/irb140.urdf",
+}
+SAID: Final = {
+    "mass": "no mass is said",
+    "inertia": "no inertia is said",
+    "two moments of inertia": "the inertia breaks",
+}
+"""What notes say of links, by what's assumed then."""
+_MARKS: Final = "<!-- tried -->\n\n", "<!-- end of tried -->"
+
+
+@cache
+def examined(path: Path) -> DescribedRobot:
+    """A robot with what's said of it; each is read once."""
+    return described(str(path))
+
+
+def table() -> str:
+    """The table, in Markdown."""
+    lines = ["| robot | file | of | joints | ends at | assumed |", "|---|---|---|---|---|---|"]
+    for name, path in ROBOTS.items():
+        found = examined(path)
+        of = "PyBullet's data" if BULLET in path.parents else "the Toolbox's data"
+        if found.robot.is_base:
+            joints, tip = "2 driven wheels", "–"
+        else:
+            assert found.description is not None
+            joints, tip = str(found.robot.arm.limits.dof), f"`{found.description.tip}`"
+        lines.append(f"| {name} | `{path.name}` | {of} | {joints} | {tip} | {', '.join(_assumed(found))} |")
+    return "\n".join(lines) + "\n"
+
+
+def _assumed(found: DescribedRobot) -> Iterator[str]:
+    """What was assumed of a robot."""
+    keys = dict.fromkeys(re.findall(r"^(\w+) =", "\n".join(found.to_state), re.MULTILINE))
+    words = {"tip": "", "tool_speed": "", "tool_turn_speed": "the tool's speeds"}
+    yield from (said for key in keys if (said := words.get(key, f"`{key}`")))
+    for what, said in SAID.items():
+        names = [re.split(rf": {said}", note)[0] for note in found.notes if re.search(rf": {said}", note)]
+        count = sum(len(name.split(", ")) for name in names)
+        if count:
+            yield f"{what} of {count} link{'s' * (count > 1)}"
+
+
+def page() -> str:
+    """The page with the table as it is."""
+    text = PAGE.read_text(encoding="utf-8")
+    start, end = text.index(_MARKS[0]) + len(_MARKS[0]), text.index(_MARKS[1])
+    return text[:start] + table() + text[end:]
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
