@@ -6,13 +6,13 @@ import math
 from collections import defaultdict
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from robots.description import meshes
 from robots.description.description import Description, Joint, JointKind, Link, Mimic
-from robots.description.urdf import MOST
+from robots.description.urdf import LARGEST_NUMBER, MOST
 from robots.solids import LinkShape
 from vrs.errors import FormatError
 from vrs.model import Array
@@ -31,13 +31,30 @@ def read_mjcf(path: Path) -> Description:
         raise FormatError(str(path), "MJCF needs mujoco: pip install vrs-teleop[mujoco]")
     import mujoco
 
+    # Warnings would go to the terminal, and into a file in the working directory.
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, mujoco.FatalError) as error:
         raise FormatError(str(path), " ".join(str(error).split())) from None
+    finally:
+        mujoco.set_mju_user_warning(before)
     if not 1 <= model.nbody <= MOST:
         raise FormatError(str(path), f"must have 1 to {MOST} bodies; has {model.nbody}")
+    for name in _NUMBERS:
+        numbers = np.abs(getattr(model, name))
+        if not (numbers <= LARGEST_NUMBER).all():
+            raise FormatError(str(path), f"{name}: numbers must be within ±{LARGEST_NUMBER:g}")
     return _Compiled(model, path).description()
+
+
+_NUMBERS: Final = (
+    "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
+    "jnt_range", "jnt_actfrcrange", "qpos0", "key_qpos", "dof_damping", "dof_frictionloss", "geom_pos", "geom_quat",
+    "geom_size", "geom_rgba", "mat_rgba", "mesh_vert", "eq_data", "actuator_gear", "actuator_gainprm",
+)  # fmt: skip
+"""What is read of a compiled model."""
 
 
 class _Compiled:

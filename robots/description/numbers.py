@@ -13,6 +13,7 @@ from vrs.errors import FormatError, InvalidValueError
 
 LARGEST: Final = 2**18
 """Of a TOML file [B]."""
+_Number = Annotated[float, within(-1e3, 1e3)]
 _S = TypeVar("_S", bound=msgspec.Struct)
 
 
@@ -71,11 +72,11 @@ class Stated(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Nominal linear speed of the tool."""
     tool_turn_speed: Annotated[float, within(1e-3, 50.0, "rad/s")] | None = None
     """Nominal angular speed of the tool."""
-    point: tuple[float, float, float] | None = None
+    point: tuple[_Number, _Number, _Number] | None = None
     """Where a gripper holds, in the tip's frame [m]."""
     joints: dict[str, StatedJoint] = {}
     """By their names."""
-    poses: dict[str, dict[str, float]] = {}
+    poses: dict[str, dict[str, _Number]] = {}
     """Named poses: values of joints by their names [rad, m]."""
     base: BaseNumbers | None = None
     """Of a mobile robot."""

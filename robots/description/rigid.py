@@ -1,4 +1,4 @@
-"""What a description's arm weighs: a chain of rigid links, and what was assumed for it."""
+"""What a description's arm weighs: a chain of rigid links, and what was assumed of its drives."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from robots.chain import Chain, ChainLink, Inertia, quaternion, together
 from robots.description.description import Description, Joint, JointKind
 from vrs.model import Array
 
-LEAST_MASS: Final = 0.1
-"""Mass of a moving link of which none is stated [kg], an assumption."""
-LEAST_SIZE: Final = 0.02
-"""Radius of the ball by whose inertia one is replaced that is less [m], an assumption."""
+ROTOR_TIME: Final = 0.02
+"""In what time a drive with nothing on it reaches its joint's largest speed, where its inertia isn't said [s]."""
+ROTOR_MOST: Final = (0.1, 10.0)
+"""Inertia that is assumed at most [kg m²], and of prismatic joints [kg]."""
 
 
 def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, ...]]:
@@ -23,7 +23,7 @@ def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, .
     What hangs on other joints is fixed where they rest: at 0, or at the limit that is nearest to it.
 
     Args:
-        description: Of the robot.
+        description: Of the robot, nothing missing.
         tip: The link that holds loads.
 
     Returns:
@@ -44,37 +44,40 @@ def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, .
         if owner >= 0:
             link = description.links[name]
             parts[owner].append(Inertia(link.mass, link.centre, link.inertia).moved(X))
-    notes: list[str] = []
-    links = tuple(_link(*joint, together(part), notes) for joint, part in zip(joints, parts, strict=True))
-    return Chain(links, placed[tip][1]), tuple(notes)
+    links = tuple(_link(joint, X, together(part)) for (joint, X), part in zip(joints, parts, strict=True))
+    return Chain(links, placed[tip][1]), tuple(_notes([joint for joint, _ in joints]))
 
 
-def _link(joint: Joint, X: Array, inertia: Inertia, notes: list[str]) -> ChainLink:
-    mass, centre, tensor = inertia
-    if mass <= 0.0:
-        mass = LEAST_MASS
-        notes.append(f"no link on joint {joint.name} has a mass: {LEAST_MASS:g} kg is assumed")
-    least = 0.4 * mass * LEAST_SIZE**2
-    if np.linalg.eigvalsh(tensor)[0] < 0.1 * least:
-        tensor = tensor + least * np.eye(3)
-        notes.append(
-            f"links on joint {joint.name} have no inertia about some axis: that of a ball of "
-            f"{100 * LEAST_SIZE:g} cm is added"
-        )
-    effort = joint.effort if joint.effort else math.inf
-    if effort == math.inf:
-        notes.append(f"joint {joint.name} states no effort: its drive has no limit")
+def _link(joint: Joint, X: Array, inertia: Inertia) -> ChainLink:
+    prismatic, effort = joint.kind is JointKind.PRISMATIC, joint.effort or math.inf
+    armature = joint.armature
+    if not armature and joint.effort and joint.qd_max:
+        armature = min(ROTOR_TIME * joint.effort / joint.qd_max, ROTOR_MOST[prismatic])
     return ChainLink(
         X[:3, 3],
         quaternion(X[:3, :3]),
-        Inertia(mass, centre, tensor),
+        inertia,
         axis=joint.axis,
-        prismatic=joint.kind is JointKind.PRISMATIC,
+        prismatic=prismatic,
         effort=effort,
-        armature=joint.armature,
+        armature=armature,
         viscous=joint.damping,
         coulomb=(joint.friction, -joint.friction),
     )
+
+
+def _notes(joints: list[Joint]) -> list[str]:
+    unlimited = ", ".join(joint.name for joint in joints if not joint.effort)
+    rotors = ", ".join(joint.name for joint in joints if joint.effort and not joint.armature)
+    notes = (
+        [f"{unlimited}: no effort is said; drives have no limit and no inertia of their own."] if unlimited else []
+    )
+    if rotors:
+        notes.append(
+            f"{rotors}: no inertia of the drive is said; assumed such that it reaches the joint's speed in "
+            f"{1e3 * ROTOR_TIME:g} ms by itself, at most {ROTOR_MOST[0]:g} kg m² or {ROTOR_MOST[1]:g} kg."
+        )
+    return notes
 
 
 def at_rest(joint: Joint) -> float:

@@ -20,6 +20,8 @@ from vrs.model import Array
 
 MOST: Final = 500
 """Links of a description."""
+LARGEST_NUMBER: Final = 1e9
+"""Size of the largest number that's read."""
 _KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
     "continuous": JointKind.CONTINUOUS,
@@ -262,7 +264,9 @@ class _Reading:
                 *self._sizes(where, [geometry.cylinder.radius, geometry.cylinder.length], 2).tolist()
             )
         name, scale = geometry.mesh.filename, geometry.mesh.scale
-        factors = np.broadcast_to(1.0 if scale is None else np.asarray(scale, dtype=np.float64), (3,))
+        factors = np.ones(3) if scale is None else np.ravel(scale) * np.ones(3 if np.size(scale) == 1 else 1)
+        if not self._finite(where, factors, (3,)).all():
+            raise FormatError(self._where, f"{where}: a mesh's scale must not be 0; given: {factors.tolist()}")
         path = None if not name else found(name, self._path)
         if path is None:
             fetched = (
@@ -275,7 +279,7 @@ class _Reading:
         key = path, tuple(factors.tolist())
         if key not in self._surfaces:
             try:
-                self._surfaces[key] = meshes.read_mesh(path, self._finite(where, factors, (3,)))
+                self._surfaces[key] = meshes.read_mesh(path, factors)
             except FormatError as error:
                 self._surfaces[key] = str(error)
         surface = self._surfaces[key]
@@ -295,8 +299,10 @@ class _Reading:
 
     def _finite(self, where: str, values: Any, shape: tuple[int, ...]) -> Array:
         array = np.asarray(values, dtype=np.float64)
-        if array.shape != shape or not np.isfinite(array).all() or np.abs(array).max(initial=0.0) > 1e9:
-            raise FormatError(self._where, f"{where}: numbers must be finite; given: {array.tolist()}")
+        if array.shape != shape or not (np.abs(array) <= LARGEST_NUMBER).all():
+            count = " × ".join(map(str, shape))
+            allowed = f"{count} numbers within ±{LARGEST_NUMBER:g}"
+            raise FormatError(self._where, f"{where}: must have {allowed}; given: {array.tolist()}")
         return array
 
 

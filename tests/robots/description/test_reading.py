@@ -124,6 +124,17 @@ def test_mjcf_is_what_mujoco_makes_of_it(tmp_path: Path) -> None:
     assert (tip_of(description), description.name) == ("b", "two and a half")
 
 
+def test_mjcf_with_numbers_that_are_none_is_refused_in_silence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("model.xml").write_text(MJCF.replace('pos="0.3 0 0"', 'pos="nan 0 0"'))
+    with pytest.raises(FormatError, match=r"model\.xml"):
+        read(Path("model.xml"))
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["model.xml"]
+
+
 def _at(description: Description, q: dict[str, float]) -> dict[str, Array]:
     poses = {description.root: np.eye(4)}
     for joint in description.joints:
@@ -264,6 +275,8 @@ def test_limits_of_moveit_count_and_toml_counts_more(tmp_path: Path) -> None:
         ("[joints.elbow]\nvelocity = -1", "allowed: lower in [-1000, 1000] rad"),
         ("[joints.slide]\nlower = 2", "slide: lower must be below upper: 2, 0.8"),
         ("[base]\nwheels = 2", "allowed: wheelbase in [0.02, 5] m"),
+        ("point = [0, nan, 0]", "Expected `float`"),
+        ("[poses.a]\nslide = inf", "Expected `float`"),
         ("tip = ", "isn't TOML"),
         ("tip = " + 4000 * "[", "isn't TOML"),
     ],
@@ -281,6 +294,7 @@ BOMB = '<!DOCTYPE r [<!ENTITY a "aaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
 LINK = '<link name="a"/>'
 PAIR = """<robot><link name="a"/><link name="b">{link}</link><joint name="j" type="{kind}">
 <parent link="a"/><child link="b"/>{joint}</joint></robot>"""
+MESH = "<visual><geometry><mesh filename='a.stl' scale='{}'/></geometry></visual>"
 MASS, BOX = "<inertial><mass value='{}'/></inertial>", "<visual><geometry><box size='{}'/></geometry></visual>"
 
 
@@ -307,7 +321,9 @@ def pair(link: str = "", kind: str = "revolute", joint: str = "") -> str:
         (pair(MASS.format("heavy")), "link 'b': could not convert"),
         (pair(MASS.format("nan")), "mass must be 0 kg or more"),
         (pair(BOX.format("1 -1 1")), "sizes must be positive"),
-        (pair(joint="<origin xyz='inf 0 0'/>"), "joint 'j': numbers must be finite"),
+        (pair(MESH.format("0 1 1")), "scale must not be 0"),
+        (pair(MESH.format("1 1")), "link 'b': must have 3 numbers"),
+        (pair(joint="<origin xyz='inf 0 0'/>"), "joint 'j': must have 4 × 4 numbers"),
         (pair(joint="<origin xyz='${x} 0 0'/>"), "left of xacro"),
         ("<mujoco><worldbody><body><geom/></body></worldbody></mujoco>", "Error"),
     ],

@@ -1,4 +1,4 @@
-"""The table of robots that were tried, in docs/howto/robot.md: `python -m tests.robots.description.tried`."""
+"""The table of robots that were tried; `python -m tests.robots.description.tried` writes it into the how-to."""
 
 from __future__ import annotations
 
