@@ -21,6 +21,8 @@ LARGEST: Final = 64 * 2**20
 """Of a file with a mesh [B]."""
 MOST_TRIANGLES: Final = 6000
 """Of a shape; a page with twelve heavy links still opens at once."""
+_PICTURES, _PIXELS = (".png", ".jpg", ".jpeg"), 2**24
+"""Kinds and size of pictures."""
 GREY: Final = (0.72, 0.74, 0.76)
 """Colour of what says none."""
 Faces: TypeAlias = NDArray[np.int64]
@@ -29,16 +31,26 @@ _THIN: Final = 1e-4
 
 
 class _LocalFiles:
-    """What a mesh's file names beside it, materials alone; the page draws no pictures."""
+    """What a mesh's file names beside it: materials, and pictures that its colours are taken from."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
+    def __getitem__(self, name: str) -> bytes:
+        return self.get(name)
+
     def get(self, name: str) -> bytes:
-        path = self._folder / Path(name).name
-        if path.suffix.lower() != ".mtl":
+        path = self._folder / Path(name.replace("\\", "/")).name
+        if path.suffix.lower() == ".mtl":
+            return bounded_text(path, LARGEST).encode()
+        if path.suffix.lower() not in _PICTURES or path.stat().st_size > LARGEST:
             raise FileNotFoundError(name)
-        return bounded_text(path, LARGEST).encode()
+        from PIL import Image
+
+        with Image.open(path) as picture:
+            if picture.width * picture.height > _PIXELS:
+                raise FileNotFoundError(name)
+        return path.read_bytes()
 
     def keys(self) -> list[str]:
         return []
@@ -114,10 +126,17 @@ def _metres(units: str | None) -> float:
 
 def _own_colours(mesh: Any) -> Array | None:
     """Colours of a mesh's faces, (m, 3); None where its file says none."""
+    import trimesh
+
     visual = mesh.visual
-    if visual.kind == "texture":
-        colour = np.asarray(visual.material.main_color, dtype=np.float64)[:3] / 255.0
-        return np.tile(colour, (len(mesh.faces), 1))
+    if isinstance(visual, trimesh.visual.TextureVisuals):
+        material = visual.material
+        if visual.uv is None or not (
+            getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+        ):
+            return np.tile(np.asarray(material.main_color[:3], dtype=np.float64) / 255.0, (len(mesh.faces), 1))
+        visual = visual.to_color()
+        visual.mesh = mesh
     if visual.kind in {"face", "vertex"}:
         return np.asarray(visual.face_colors[:, :3], dtype=np.float64) / 255.0
     return None
