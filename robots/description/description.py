@@ -100,6 +100,14 @@ class Description:
     """Named poses: values of joints by their names."""
     tips: Mapping[str, str] = field(default_factory=dict)
     """Named groups that are chains: the tip of each."""
+    tip: str = ""
+    """The link at the end of the arm; empty where nobody has chosen."""
+    tool_speed: float | None = None
+    """Nominal linear speed of the tool [m/s]; None where nothing is said."""
+    tool_turn_speed: float | None = None
+    """Nominal angular speed of the tool [rad/s]; None where nothing is said."""
+    point: tuple[float, float, float] | None = None
+    """Where a gripper holds, in the tip's frame [m]; None where nothing is said."""
     notes: tuple[str, ...] = ()
     """What was missing or can't be, what was assumed for it, and how it's stated; a sentence each."""
 
