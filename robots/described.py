@@ -19,7 +19,8 @@ from robots.description.beside import stated_file, stated_of
 from robots.description.description import Description
 from robots.description.numbers import BaseNumbers, parse_base, read_base, stem
 from robots.description.reading import read
-from robots.description.wheels import at_rest, wheeled
+from robots.description.rigid import at_rest, motion
+from robots.description.wheels import wheeled
 from robots.mobile import differential
 from robots.onboard.laser import LaserModel
 from robots.robot import NUMBERS, Appearance, Gripper, Robot
@@ -159,7 +160,7 @@ def _arm_shapes(description: Description) -> Sequence[LinkShape]:
             of[joint.child], frames[joint.child] = numbers[joint.name], np.eye(4)
         else:
             of[joint.child] = of[joint.parent]
-            frames[joint.child] = frames[joint.parent] @ joint.X @ at_rest(joint)
+            frames[joint.child] = frames[joint.parent] @ joint.X @ motion(joint, at_rest(joint))
     last = np.linalg.inv(frames[description.tip])
     groups: list[list[tuple[LinkShape, Array]]] = [[] for _ in range(len(numbers) + 1)]
     for name, link in description.links.items():

@@ -78,6 +78,8 @@ class Joint:
     """Viscous friction [N m s/rad], [N s/m]."""
     friction: float = 0.0
     """Coulomb friction [N m], [N]."""
+    armature: float = 0.0
+    """Inertia of the drive at the joint [kg m²], mass [kg]."""
     mimic: Mimic | None = None
 
     @property

@@ -75,7 +75,7 @@ MJCF = """<mujoco model="two and a half">
     <body name="a" pos="0.1 0 0.2" euler="0.1 0.2 0.3">
       <joint name="slide" type="slide" axis="1 0 0" range="-0.3 0.4"/>
       <joint name="turn" type="hinge" axis="0 0 1" pos="0.05 0 0" ref="0.2" range="-1 1"
-        damping="0.3" frictionloss="2"/>
+        damping="0.3" frictionloss="2" armature="0.1"/>
       <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
       <body name="b" pos="0.3 0 0">
         <joint name="bend" type="hinge" axis="0 1 0" pos="0 0 -0.02"/>
@@ -117,6 +117,7 @@ def test_mjcf_is_what_mujoco_makes_of_it(tmp_path: Path) -> None:
     assert (joints["turn"].damping, joints["turn"].friction, joints["turn"].effort) == pytest.approx(
         (0.3, 2.0, 15.0)
     )
+    assert joints["turn"].armature == pytest.approx(0.1)
     mimic = joints["jaw"].mimic
     assert mimic is not None
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("bend", -2.0, pytest.approx(0.1))

@@ -1,0 +1,1 @@
+"""Simulated bodies in MuJoCo, which is imported when a world is made."""

@@ -1,0 +1,101 @@
+"""Masses of a described arm: links between the joints that move are one; what is missing is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from robots.description.description import Description, Joint, JointKind, Link, Mimic
+from robots.description.rigid import rigid_chain
+from vrs.model import Array
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def at(x: float, y: float, z: float, turn: Array | None = None) -> Array:
+    X = np.eye(4)
+    X[:3, 3] = x, y, z
+    if turn is not None:
+        X[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    return X
+
+
+def brick(name: str, mass: float) -> Link:
+    return Link(name, mass, np.array([0.01, 0.02, 0.03]), np.diag([0.01, 0.02, 0.025]) * mass)
+
+
+def arm() -> Description:
+    """A turning post, a bracket fixed to it, a slide, and a hand whose fingers close together."""
+    names = ("base", "post", "bracket", "slide", "hand", "left", "right", "lamp")
+    links = {name: brick(name, mass) for name, mass in zip(names, (9, 4, 1, 2, 0.5, 0.1, 0.1, 0.3), strict=True)}
+    turn, slide = JointKind.REVOLUTE, JointKind.PRISMATIC
+    joints = (
+        Joint("waist", turn, "base", "post", at(0, 0, 0.2), UP, -3, 3, 2, effort=50, damping=0.5, friction=0.1),
+        Joint("screws", JointKind.FIXED, "post", "bracket", at(0.1, 0, 0.3, np.array([0.0, 1.2, 0.0]))),
+        Joint("rail", slide, "bracket", "slide", at(0, 0.05, 0), UP, 0.1, 0.5, 1, effort=80),
+        Joint("wrist", turn, "slide", "hand", at(0, 0, 0.1), np.array([1.0, 0, 0]), -1, 1, 1, effort=9),
+        Joint("thumb", slide, "hand", "left", at(0, 0.02, 0.05), np.array([0, 1.0, 0]), 0.01, 0.04),
+        Joint("finger", slide, "hand", "right", at(0, -0.02, 0.05), UP, mimic=Mimic("thumb", -1.0, 0.005)),
+        Joint("eye", turn, "post", "lamp", at(0, 0, 0.5), np.array([0, 1.0, 0]), -1, 1),
+    )
+    return Description("post", links, joints)
+
+
+def height(description: Description, q: dict[str, float]) -> float:
+    """Potential energy over g [kg m], by hand: every link's own mass where its own frame is."""
+    poses, total = {description.root: np.eye(4)}, 0.0
+    for joint in description.joints:
+        moved = np.eye(4)
+        if joint.kind is JointKind.PRISMATIC:
+            moved[:3, 3] = q.get(joint.name, 0.0) * joint.axis
+        elif joint.kind is not JointKind.FIXED:
+            moved[:3, :3] = Rotation.from_rotvec(q.get(joint.name, 0.0) * joint.axis).as_matrix()
+        poses[joint.child] = poses[joint.parent] @ joint.X @ moved
+    for name, link in description.links.items():
+        total += link.mass * float((poses[name] @ np.append(link.centre, 1.0))[2])
+    return total
+
+
+def test_what_hangs_on_joints_that_nobody_moves_goes_with_the_link_before() -> None:
+    description = arm()
+    chain, notes = rigid_chain(description, "hand")
+    assert [link.prismatic for link in chain.links] == [False, True, False]
+    assert [link.inertia.mass for link in chain.links] == pytest.approx([4 + 1 + 0.3, 2, 0.5 + 0.1 + 0.1])
+    assert [link.effort for link in chain.links] == [50, 80, 9]
+    assert (chain.links[0].viscous, chain.links[0].coulomb) == (0.5, 0.1)
+    assert notes == ()
+    # Torques at rest are the slope of the potential energy, fingers resting at their limit and their offset.
+    rest, names = {"thumb": 0.01, "finger": 0.005}, ("waist", "rail", "wrist")
+    rng = np.random.default_rng(0)
+    for q in rng.uniform(-1, 1, (5, 3)):
+        tau = chain.inverse_dynamics(q[None], np.zeros((1, 3)), np.zeros((1, 3)), gravity=9.81)[0]
+        for j in range(3):
+            ends = [
+                height(description, dict(zip(names, q + h * np.eye(3)[j], strict=True)) | rest)
+                for h in (1e-5, -1e-5)
+            ]
+            assert tau[j] == pytest.approx(9.81 * (ends[0] - ends[1]) / 2e-5, abs=1e-6)
+
+
+def test_a_tip_further_in_carries_what_is_beyond_it() -> None:
+    chain, _ = rigid_chain(arm(), "slide")
+    assert [link.inertia.mass for link in chain.links] == pytest.approx([5.3, 2.7])
+
+
+def test_masses_inertias_and_efforts_that_are_missing_are_assumed_and_said() -> None:
+    description = arm()
+    hollow = {name: Link(name) for name in ("hand", "left", "right")} | {
+        "slide": replace(brick("slide", 2), inertia=np.zeros((3, 3)))
+    }
+    joints = tuple(replace(joint, effort=None) if joint.name == "rail" else joint for joint in description.joints)
+    chain, notes = rigid_chain(replace(description, links={**description.links, **hollow}, joints=joints), "hand")
+    assert chain.links[2].inertia.mass == 0.1
+    assert chain.links[1].effort == np.inf
+    assert [
+        word in " ".join(notes)
+        for word in ("wrist has a mass: 0.1 kg", "rail states no effort", "on joint rail have no inertia")
+    ] == [True] * 3
+    assert np.linalg.eigvalsh(chain.mass_matrix(np.zeros(3)))[0] > 1e-6
