@@ -26,6 +26,9 @@ _PICTURES, _PIXELS = (".png", ".jpg", ".jpeg"), 2**24
 GREY: Final = (0.72, 0.74, 0.76)
 """Colour of what says none."""
 Faces: TypeAlias = NDArray[np.int64]
+_FINEST, _TRIES = 1024.0, 8
+"""Cells a side of the finest grid that a heavy mesh is put on, and how many grids are tried."""
+_PLACES: Final = np.array([1, 2**12, 2**24])
 _THIN: Final = 1e-4
 """Least thickness of a convex piece [m]."""
 
@@ -217,19 +220,22 @@ def simplified(vertices: Array, faces: Faces, colours: Array, most: int) -> tupl
         The same of what is left, in which no triangle occurs twice.
     """
     low, extent = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
-    few, many, best = 2.0, 4096.0, None
-    for _ in range(14):
+    few, many, best = 2.0, _FINEST, None
+    for _ in range(_TRIES):
         cells = np.sqrt(few * many)
         grid = np.floor((vertices - low) * (cells / max(extent, 1e-12))).astype(np.int64)
-        _, inverse, counts = np.unique(grid, axis=0, return_inverse=True, return_counts=True)
-        joined = inverse.reshape(-1)[faces]
+        _, inverse, counts = np.unique(grid @ _PLACES, return_inverse=True, return_counts=True)
+        joined = inverse[faces]
         distinct = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
-        _, first = np.unique(np.sort(joined[distinct], axis=1), axis=0, return_index=True)
+        corners = np.sort(joined[distinct], axis=1)
+        _, first = np.unique(
+            (corners[:, 0] * len(counts) + corners[:, 1]) * len(counts) + corners[:, 2], return_index=True
+        )
         if len(first) > most:
             many = cells
         else:
-            few, best = cells, (inverse.reshape(-1), counts, joined[distinct][first], colours[distinct][first])
-    assert best is not None, "a grid of two cells leaves a handful of triangles"
+            few, best = cells, (inverse, counts, joined[distinct][first], colours[distinct][first])
+    assert best is not None, "a coarse grid leaves a handful of triangles"
     inverse, counts, left, coloured = best
     middles = np.stack([np.bincount(inverse, vertices[:, k]) for k in range(3)], axis=1) / counts[:, None]
     return middles, left, coloured
