@@ -19,8 +19,8 @@ from robots.description.beside import stated_file, stated_of
 from robots.description.description import Description
 from robots.description.numbers import BaseNumbers, parse_base, read_base, stem
 from robots.description.reading import read
-from robots.description.rigid import rigid_chain
-from robots.description.wheels import at_rest, wheeled
+from robots.description.rigid import at_rest, motion, rigid_chain
+from robots.description.wheels import wheeled
 from robots.mobile import differential
 from robots.onboard.laser import LaserModel
 from robots.robot import NUMBERS, Appearance, Gripper, Robot
@@ -101,7 +101,7 @@ def described(what: str) -> DescribedRobot:
     whole = completed(description, tip)
     model = arm_model(whole, whole.tip)
     shapes = _arm_shapes(whole)
-    chain, weights = rigid_chain(whole, whole.tip)
+    chain = rigid_chain(whole, whole.tip)
     bodies = {world: partial(chain_arm, world, chain, model.limits) for world in WORLDS}
     robot = Robot(
         _called(whole, path),
@@ -112,7 +112,7 @@ def described(what: str) -> DescribedRobot:
         tuple(joint.name for joint in whole.chain(whole.tip) if joint.moves),
         f"{path}{TIP}{tip}" if tip else str(path),
     )
-    return DescribedRobot(robot, whole, (*whole.notes, *weights), tuple(lines_to_state(description, whole)), file)
+    return DescribedRobot(robot, whole, whole.notes, tuple(lines_to_state(description, whole)), file)
 
 
 def split(what: str) -> tuple[str, str]:
@@ -158,7 +158,7 @@ def _arm_shapes(description: Description) -> Sequence[LinkShape]:
             of[joint.child], frames[joint.child] = numbers[joint.name], np.eye(4)
         else:
             of[joint.child] = of[joint.parent]
-            frames[joint.child] = frames[joint.parent] @ joint.X @ at_rest(joint)
+            frames[joint.child] = frames[joint.parent] @ joint.X @ motion(joint, at_rest(joint))
     last = np.linalg.inv(frames[description.tip])
     groups: list[list[tuple[LinkShape, Array]]] = [[] for _ in range(len(numbers) + 1)]
     for name, link in description.links.items():

@@ -21,24 +21,39 @@ LARGEST: Final = 64 * 2**20
 """Of a file with a mesh [B]."""
 MOST_TRIANGLES: Final = 6000
 """Of a shape; a page with twelve heavy links still opens at once."""
+_PICTURES, _PIXELS = (".png", ".jpg", ".jpeg"), 2**24
+"""Kinds and size of pictures."""
 GREY: Final = (0.72, 0.74, 0.76)
 """Colour of what says none."""
 Faces: TypeAlias = NDArray[np.int64]
+_FINEST, _TRIES = 1024.0, 8
+"""Cells a side of the finest grid that a heavy mesh is put on, and how many grids are tried."""
+_PLACES: Final = np.array([1, 2**12, 2**24])
 _THIN: Final = 1e-4
 """Least thickness of a convex piece [m]."""
 
 
 class _LocalFiles:
-    """What a mesh's file names beside it, materials alone; the page draws no pictures."""
+    """What a mesh's file names beside it: materials, and pictures that its colours are taken from."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
+    def __getitem__(self, name: str) -> bytes:
+        return self.get(name)
+
     def get(self, name: str) -> bytes:
-        path = self._folder / Path(name).name
-        if path.suffix.lower() != ".mtl":
+        path = self._folder / Path(name.replace("\\", "/")).name
+        if path.suffix.lower() == ".mtl":
+            return bounded_text(path, LARGEST).encode()
+        if path.suffix.lower() not in _PICTURES or path.stat().st_size > LARGEST:
             raise FileNotFoundError(name)
-        return bounded_text(path, LARGEST).encode()
+        from PIL import Image
+
+        with Image.open(path) as picture:
+            if picture.width * picture.height > _PIXELS:
+                raise FileNotFoundError(name)
+        return path.read_bytes()
 
     def keys(self) -> list[str]:
         return []
@@ -114,10 +129,17 @@ def _metres(units: str | None) -> float:
 
 def _own_colours(mesh: Any) -> Array | None:
     """Colours of a mesh's faces, (m, 3); None where its file says none."""
+    import trimesh
+
     visual = mesh.visual
-    if visual.kind == "texture":
-        colour = np.asarray(visual.material.main_color, dtype=np.float64)[:3] / 255.0
-        return np.tile(colour, (len(mesh.faces), 1))
+    if isinstance(visual, trimesh.visual.TextureVisuals):
+        material = visual.material
+        if visual.uv is None or not (
+            getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+        ):
+            return np.tile(np.asarray(material.main_color[:3], dtype=np.float64) / 255.0, (len(mesh.faces), 1))
+        visual = visual.to_color()
+        visual.mesh = mesh
     if visual.kind in {"face", "vertex"}:
         return np.asarray(visual.face_colors[:, :3], dtype=np.float64) / 255.0
     return None
@@ -198,19 +220,22 @@ def simplified(vertices: Array, faces: Faces, colours: Array, most: int) -> tupl
         The same of what is left, in which no triangle occurs twice.
     """
     low, extent = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
-    few, many, best = 2.0, 4096.0, None
-    for _ in range(14):
+    few, many, best = 2.0, _FINEST, None
+    for _ in range(_TRIES):
         cells = np.sqrt(few * many)
         grid = np.floor((vertices - low) * (cells / max(extent, 1e-12))).astype(np.int64)
-        _, inverse, counts = np.unique(grid, axis=0, return_inverse=True, return_counts=True)
-        joined = inverse.reshape(-1)[faces]
+        _, inverse, counts = np.unique(grid @ _PLACES, return_inverse=True, return_counts=True)
+        joined = inverse[faces]
         distinct = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
-        _, first = np.unique(np.sort(joined[distinct], axis=1), axis=0, return_index=True)
+        corners = np.sort(joined[distinct], axis=1)
+        _, first = np.unique(
+            (corners[:, 0] * len(counts) + corners[:, 1]) * len(counts) + corners[:, 2], return_index=True
+        )
         if len(first) > most:
             many = cells
         else:
-            few, best = cells, (inverse.reshape(-1), counts, joined[distinct][first], colours[distinct][first])
-    assert best is not None, "a grid of two cells leaves a handful of triangles"
+            few, best = cells, (inverse, counts, joined[distinct][first], colours[distinct][first])
+    assert best is not None, "a coarse grid leaves a handful of triangles"
     inverse, counts, left, coloured = best
     middles = np.stack([np.bincount(inverse, vertices[:, k]) for k in range(3)], axis=1) / counts[:, None]
     return middles, left, coloured

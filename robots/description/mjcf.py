@@ -51,8 +51,9 @@ def read_mjcf(path: Path) -> Description:
 
 _NUMBERS: Final = (
     "body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia", "jnt_pos", "jnt_axis",
-    "jnt_range", "jnt_actfrcrange", "qpos0", "key_qpos", "dof_damping", "dof_frictionloss", "geom_pos", "geom_quat",
-    "geom_size", "geom_rgba", "mat_rgba", "mesh_vert", "eq_data", "actuator_gear", "actuator_gainprm",
+    "jnt_range", "jnt_actfrcrange", "qpos0", "key_qpos", "dof_armature", "dof_damping", "dof_frictionloss",
+    "geom_pos", "geom_quat", "geom_size", "geom_rgba", "mat_rgba", "mesh_vert", "eq_data", "actuator_gear",
+    "actuator_gainprm",
 )  # fmt: skip
 """What is read of a compiled model."""
 
@@ -128,6 +129,7 @@ class _Compiled:
         return Joint(
             name, kind, parent, child, X, axis, q_min=low, q_max=high, effort=self._efforts.get(j),
             damping=float(np.ravel(m.dof_damping[dof])[0]), friction=float(m.dof_frictionloss[dof]),
+            armature=float(m.dof_armature[dof]) or None,
             mimic=self._mimics.get(j),
         )  # fmt: skip
 

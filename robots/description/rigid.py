@@ -1,9 +1,8 @@
-"""What a description's arm weighs: a chain of rigid links, and what was assumed of its drives."""
+"""What a description's arm weighs: a chain of rigid links."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -11,13 +10,8 @@ from robots.chain import Chain, ChainLink, Inertia, quaternion, together
 from robots.description.description import Description, Joint, JointKind
 from vrs.model import Array
 
-ROTOR_TIME: Final = 0.02
-"""In what time a drive with nothing on it reaches its joint's largest speed, where its inertia isn't said [s]."""
-ROTOR_MOST: Final = (0.1, 10.0)
-"""Inertia that is assumed at most [kg m²], and of prismatic joints [kg]."""
 
-
-def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, ...]]:
+def rigid_chain(description: Description, tip: str) -> Chain:
     """The links between the joints that lead to a tip.
 
     What hangs on other joints is fixed where they rest: at 0, or at the limit that is nearest to it.
@@ -27,7 +21,7 @@ def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, .
         tip: The link that holds loads.
 
     Returns:
-        The chain, a link a moving joint; and what was assumed, a sentence each.
+        A link a moving joint.
     """
     moving = {joint.name: k for k, joint in enumerate(j for j in description.chain(tip) if j.moves)}
     placed: dict[str, tuple[int, Array]] = {description.root: (-1, np.eye(4))}
@@ -45,39 +39,21 @@ def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, .
             link = description.links[name]
             parts[owner].append(Inertia(link.mass, link.centre, link.inertia).moved(X))
     links = tuple(_link(joint, X, together(part)) for (joint, X), part in zip(joints, parts, strict=True))
-    return Chain(links, placed[tip][1]), tuple(_notes([joint for joint, _ in joints]))
+    return Chain(links, placed[tip][1])
 
 
 def _link(joint: Joint, X: Array, inertia: Inertia) -> ChainLink:
-    prismatic, effort = joint.kind is JointKind.PRISMATIC, joint.effort or math.inf
-    armature = joint.armature
-    if not armature and joint.effort and joint.qd_max:
-        armature = min(ROTOR_TIME * joint.effort / joint.qd_max, ROTOR_MOST[prismatic])
     return ChainLink(
         X[:3, 3],
         quaternion(X[:3, :3]),
         inertia,
         axis=joint.axis,
-        prismatic=prismatic,
-        effort=effort,
-        armature=armature,
+        prismatic=joint.kind is JointKind.PRISMATIC,
+        effort=joint.effort or math.inf,
+        armature=joint.armature or 0.0,
         viscous=joint.damping,
         coulomb=(joint.friction, -joint.friction),
     )
-
-
-def _notes(joints: list[Joint]) -> list[str]:
-    unlimited = ", ".join(joint.name for joint in joints if not joint.effort)
-    rotors = ", ".join(joint.name for joint in joints if joint.effort and not joint.armature)
-    notes = (
-        [f"{unlimited}: no effort is said; drives have no limit and no inertia of their own."] if unlimited else []
-    )
-    if rotors:
-        notes.append(
-            f"{rotors}: no inertia of the drive is said; assumed such that it reaches the joint's speed in "
-            f"{1e3 * ROTOR_TIME:g} ms by itself, at most {ROTOR_MOST[0]:g} kg m² or {ROTOR_MOST[1]:g} kg."
-        )
-    return notes
 
 
 def at_rest(joint: Joint) -> float:

@@ -59,8 +59,12 @@ class _Reading:
         self._drop_unknown(root)
         self._take_defaults(root)
         self._robot = self._parse(root)
+        # A colour that one link gives a name counts for the others that name it.
+        materials = [visual.material for link in self._robot.links for visual in link.visuals if visual.material]
         self._colours = {
-            material.name: material.color.rgba for material in self._robot.materials if material.color is not None
+            material.name: material.color.rgba
+            for material in (*materials, *self._robot.materials)
+            if material.color is not None
         }
 
     def description(self) -> Description:

@@ -9,6 +9,7 @@ import numpy as np
 
 from robots.description.description import Description, Joint, JointKind, Link
 from robots.description.numbers import BaseNumbers
+from robots.description.rigid import at_rest, motion
 from robots.solids import LinkShape
 from vrs.model import Array
 
@@ -55,24 +56,8 @@ def placed(description: Description) -> dict[str, Array]:
     """Poses of all links in the root's frame where joints are at 0, or as near as their limits allow, (4, 4)."""
     poses = {description.root: np.eye(4)}
     for joint in description.joints:
-        poses[joint.child] = poses[joint.parent] @ joint.X @ at_rest(joint)
+        poses[joint.child] = poses[joint.parent] @ joint.X @ motion(joint, at_rest(joint))
     return poses
-
-
-def at_rest(joint: Joint) -> Array:
-    """What a joint does where it's at 0, or as near to it as its limits are, (4, 4)."""
-    low, high = -np.inf if joint.q_min is None else joint.q_min, np.inf if joint.q_max is None else joint.q_max
-    X = np.eye(4)
-    q = 0.0 if joint.kind is JointKind.FIXED else float(np.clip(0.0, low, high))
-    if joint.mimic is not None:
-        q = joint.mimic.offset
-    if joint.kind is JointKind.PRISMATIC:
-        X[:3, 3] = q * joint.axis
-    elif q:
-        from scipy.spatial.transform import Rotation
-
-        X[:3, :3] = Rotation.from_rotvec(q * joint.axis).as_matrix()
-    return X
 
 
 def wheeled(description: Description, stated: BaseNumbers) -> WheeledBase | None:

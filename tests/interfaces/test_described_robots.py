@@ -156,5 +156,5 @@ def test_a_described_arm_is_served_with_its_shapes_and_the_names_of_its_joints(r
         page.take_control()
         names = "[...document.querySelectorAll('.joint .name')].map((name) => name.title)"
         assert page.get(names) == ["slide", "shoulder", "elbow", "roll"]
-        page.page.locator("button[aria-label='Joint 2 up']").click()
+        page.page.locator("button[aria-label='Joint 2 up']").click(delay=500)
         page.wait("station.session.timeline.joints(station.session.now)[1] > 0.001")

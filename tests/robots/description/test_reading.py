@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 import yourdfpy
+from PIL import Image
 
 from robots import load
 from robots.described import described
@@ -74,7 +75,7 @@ MJCF = """<mujoco model="two and a half">
     <body name="a" pos="0.1 0 0.2" euler="0.1 0.2 0.3">
       <joint name="slide" type="slide" axis="1 0 0" range="-0.3 0.4"/>
       <joint name="turn" type="hinge" axis="0 0 1" pos="0.05 0 0" ref="0.2" range="-1 1"
-        damping="0.3" frictionloss="2"/>
+        damping="0.3" frictionloss="2" armature="0.1"/>
       <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/>
       <body name="b" pos="0.3 0 0">
         <joint name="bend" type="hinge" axis="0 1 0" pos="0 0 -0.02"/>
@@ -116,6 +117,7 @@ def test_mjcf_is_what_mujoco_makes_of_it(tmp_path: Path) -> None:
     assert (joints["turn"].damping, joints["turn"].friction, joints["turn"].effort) == pytest.approx(
         (0.3, 2.0, 15.0)
     )
+    assert joints["turn"].armature == pytest.approx(0.1)
     mimic = joints["jaw"].mimic
     assert mimic is not None
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("bend", -2.0, pytest.approx(0.1))
@@ -362,6 +364,29 @@ def test_a_mesh_that_cannot_be_read_is_said_and_missing(tmp_path: Path, name: st
     description = read(tmp_path / "r.urdf")
     assert description.links["a"].shapes == ()
     assert name in description.notes[0]
+
+
+PICTURED = """mtllib m.mtl
+v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.2 0.5\nvt 0.8 0.5\nusemtl skin
+f 1/1 2/1 3/1\nf 1/2 2/2 4/2\nusemtl plain\nf 1/1 3/1 4/1\n"""
+
+
+def test_colours_are_those_of_materials_pictures_and_names(tmp_path: Path) -> None:
+    picture = Image.new("RGB", (2, 1))
+    picture.putdata([(255, 0, 0), (0, 0, 255)])
+    picture.save(tmp_path / "p.png")
+    (tmp_path / "a.obj").write_text(PICTURED)
+    (tmp_path / "m.mtl").write_text("newmtl skin\nmap_Kd p.png\nnewmtl plain\nKd 0 1 0\n")
+    (tmp_path / "r.urdf").write_text(
+        """<robot name="r"><link name="a"><visual><geometry><box size="1 1 1"/></geometry>
+        <material name="own"><color rgba="1 1 0 1"/></material></visual>
+        </link><link name="b"><visual><geometry><mesh filename="a.obj"/></geometry><material name="own"/></visual>
+        <visual><geometry><sphere radius="1"/></geometry><material name="own"/></visual></link>
+        <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"""
+    )
+    several, one = read(tmp_path / "r.urdf").links["b"].shapes
+    assert sorted(map(tuple, np.round(several.face_colours, 1).tolist())) == [(0, 0, 1), (0, 1, 0), (1, 0, 0)]
+    assert one.colour == pytest.approx([1, 1, 0])
 
 
 def test_units_of_collada_count() -> None:
