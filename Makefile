@@ -6,7 +6,7 @@ DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test contract generate lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -44,6 +44,11 @@ reproduce: $(STAMP)
 # The documentation as a site, in out/site; a warning is an error.
 docs: $(DOCS_STAMP)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --strict
+
+# Whether all that the base install needs has wheels for each machine and Python that README names.
+platforms: $(DEV_STAMP)
+	$(PIP) -e '.[platforms]'
+	$(PY) .ci/platforms.py
 
 # Every command of README and docs that takes too long for `make test`.
 docs-check: $(DEV_STAMP)

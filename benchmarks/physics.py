@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks.timing import seconds
-from robots.bullet import Payload, Reality, World, load_arm
-from robots.puma560.body import RealArm, puma_links
+from robots.bullet import World
+from robots.bullet.chain import BulletChain
+from robots.puma560.body import RealArm, chain
 from robots.puma560.parameters import POSES, default_limits
+from robots.simulated import Payload, Reality
 from vrs.model import Array
 
 if TYPE_CHECKING:
@@ -49,14 +51,13 @@ def measure(blocks: int = 20) -> dict[str, float]:
     arm_s, bare_s = [], []
     with (
         RealArm(Reality(), q=POSES["nominal"], payload=Payload(2.5)) as arm,
-        World(gravity=9.81, dt=1e-3) as world,
+        BulletChain(chain(), gravity=9.81, dt=1e-3) as bare,
     ):
-        body = load_arm(world, puma_links())
         arm.run(q[:1], qd[:1], qdd[:1])
         for i in range(blocks):
             part = slice(i * BLOCK, (i + 1) * BLOCK)
             arm_s.append(seconds(partial(arm.run, q[part], qd[part], qdd[part])))
-            bare_s.append(seconds(partial(bare_loop, world, body, np.zeros((BLOCK, 6)))))
+            bare_s.append(seconds(partial(bare_loop, bare.world, bare.body, np.zeros((BLOCK, 6)))))
     step = statistics.median(arm_s) / BLOCK
     bare = statistics.median(bare_s) / BLOCK
     return {

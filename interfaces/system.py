@@ -1,4 +1,7 @@
-"""What the machine provides: files, processes and their priority, our version, other people's modules by name."""
+"""What the machine provides: files, processes and their priority, our version, other people's modules by name.
+
+What only some systems have is asked for here alone, and done without where it isn't there.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,56 @@ import contextlib
 import importlib
 import inspect
 import os
-import resource
 import secrets
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from vrs.errors import FormatError, InvalidValueError
+
+if TYPE_CHECKING:
+    import asyncio
+
+T = TypeVar("T")
+PLAIN_READ: Final = (
+    os.O_RDONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+)
+"""Flags to open a file for reading that may turn out to be none: nothing waits for its other end."""
+
+
+def run_loop(main: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine to its end in a loop of its own: uvloop's, where that is installed."""
+    import asyncio
+
+    try:
+        import uvloop
+    except ImportError:
+        return asyncio.run(main)
+    return uvloop.run(main)
+
+
+def on_signal(loop: asyncio.AbstractEventLoop, number: int, act: Callable[[], object]) -> None:
+    """Let a signal do something in a running loop, and nothing else."""
+    try:
+        loop.add_signal_handler(number, act)
+    except NotImplementedError:
+        signal.signal(number, lambda *_: loop.call_soon_threadsafe(act))
+
+
+def open_files(wanted: int) -> int:
+    """Ask that this process may open so many files; returns how many it may."""
+    try:
+        import resource
+    except ImportError:
+        return wanted
+    unlimited, kind = resource.RLIM_INFINITY, resource.RLIMIT_NOFILE
+    soft, hard = (wanted if most == unlimited else most for most in resource.getrlimit(kind))
+    if soft < min(wanted, hard):
+        resource.setrlimit(kind, (min(wanted, hard), resource.getrlimit(kind)[1]))
+    return max(soft, min(wanted, hard))
 
 
 def read_within(path: Path, most: int) -> bytes:
@@ -175,13 +218,21 @@ def hasten(priority: int) -> bool:
         priority: Among real-time processes, from 1; the higher one goes first.
     """
     try:
+        import resource
+
         signal.signal(signal.SIGXCPU, lambda *_: os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0)))
         _, hard = resource.getrlimit(resource.RLIMIT_RTTIME)
         resource.setrlimit(resource.RLIMIT_RTTIME, (round(OWN_TIME * 1e6), hard))
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
-    except (OSError, ValueError):
+    except (OSError, ValueError, ImportError, AttributeError):
+        be_nice(NICE)
         with suppress(OSError):
-            os.nice(NICE)
             Path("/proc/self/autogroup").write_text(str(NICE), encoding="ascii")
         return False
     return True
+
+
+def be_nice(more: int) -> None:
+    """Let other processes go first, by so much; or before them, where it's negative; as far as that's allowed."""
+    with suppress(OSError, AttributeError):
+        os.nice(more)

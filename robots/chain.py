@@ -29,6 +29,15 @@ class Inertia(NamedTuple):
         R = X[:3, :3]
         return Inertia(self.mass, R @ self.centre + X[:3, 3], R @ self.tensor @ R.T)
 
+    def principal(self) -> tuple[list[float], Array]:
+        """Principal inertias [kg m²], and the rotation from their axes to the frame."""
+        if np.count_nonzero(self.tensor - np.diag(np.diag(self.tensor))) == 0:
+            return np.diag(self.tensor).tolist(), np.eye(3)
+        values, axes = np.linalg.eigh(self.tensor)
+        if np.linalg.det(axes) < 0:
+            axes[:, 0] *= -1
+        return values.tolist(), axes
+
 
 def together(parts: Iterable[Inertia]) -> Inertia:
     """What bodies that are fixed to each other have, all in one frame."""
@@ -37,41 +46,76 @@ def together(parts: Iterable[Inertia]) -> Inertia:
     if not found:
         return Inertia(0.0, np.zeros(3), np.zeros((3, 3)))
     centre = sum((part.mass * part.centre for part in found), np.zeros(3)) / mass
-    tensor = np.zeros((3, 3))
+    tensor = sum((part.tensor for part in found), np.zeros((3, 3)))
     for part in found:
         p = part.centre - centre
-        tensor = tensor + part.tensor + part.mass * (p @ p * np.eye(3) - np.outer(p, p))
+        tensor = tensor + part.mass * (p @ p * np.eye(3) - np.outer(p, p))
     return Inertia(mass, centre, tensor)
 
 
-def principal(tensor: Array) -> tuple[list[float], Array]:
-    """Principal inertias [kg m²], and the rotation from their axes to the tensor's."""
-    if np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0:
-        return np.diag(tensor).tolist(), np.eye(3)
-    values, axes = np.linalg.eigh(tensor)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    return values.tolist(), axes
+def rotation(turn: Sequence[float]) -> Array:
+    """Rotation matrix of a unit quaternion (x, y, z, w)."""
+    x, y, z, w = turn
+    return np.array([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def quaternion(R: Array) -> list[float]:
+    """A rotation matrix as a quaternion (x, y, z, w), by the largest of its four squares."""
+    t = np.trace(R)
+    squares = np.array([*(1 + 2 * np.diag(R) - t), 1 + t])
+    k = int(np.argmax(squares))
+    if k == 3:
+        q = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], squares[3]])
+    else:
+        i, j = (k + 1) % 3, (k + 2) % 3
+        q = np.empty(4)
+        q[k], q[i], q[j] = squares[k], R[i, k] + R[k, i], R[j, k] + R[k, j]
+        q[3] = R[j, i] - R[i, j]
+    return [float(x) for x in q / np.linalg.norm(q)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainLink:
-    """A joint and the link that it moves, in the link's frame, which is the joint's."""
+    """A joint and the link that it moves.
 
-    X: Array
-    """Pose of the link's frame in the frame of the link before at q = 0, (4, 4)."""
-    axis: Array
-    """Unit vector of the joint, (3,)."""
-    prismatic: bool
+    The joint's frame moves with the link; the link's own frame, in which its inertia is, is fixed in it.
+    """
+
+    place: Array
+    """Origin of the joint's frame in that of the joint before at q = 0 [m], (3,)."""
+    turn: Sequence[float]
+    """How the joint's frame is turned in it, a unit quaternion (x, y, z, w)."""
     inertia: Inertia
+    """In the link's frame."""
+    X: Array = field(default_factory=lambda: np.eye(4))
+    """Pose of the link's frame in the joint's, (4, 4)."""
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    """Unit vector of the joint, in its frame, (3,)."""
+    prismatic: bool = False
     effort: float = np.inf
     """Largest torque of the drive [N m], force [N]."""
     armature: float = 0.0
     """Inertia of the drive at the joint [kg m²], mass [kg]."""
     viscous: float = 0.0
     """Viscous friction [N m s/rad], [N s/m]."""
-    coulomb: float = 0.0
-    """Coulomb friction [N m], [N]."""
+    coulomb: tuple[float, float] = (0.0, 0.0)
+    """Coulomb friction for positive and for negative speed [N m], [N], (≥ 0, ≤ 0)."""
+    gear: float = 0.0
+    """Turns of the encoder a turn of the joint; 0 where positions are read exactly."""
+
+    def principal(self) -> tuple[list[float], Array]:
+        """Principal inertias [kg m²], and the rotation from their axes to the joint's frame."""
+        values, axes = self.inertia.principal()
+        return values, self.X[:3, :3] @ axes
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass in the joint's frame [m], (3,)."""
+        return self.X[:3, 3] + self.X[:3, :3] @ self.inertia.centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +160,7 @@ class Chain:
             else:
                 wd = wd + _cross(w, speed) + rate
                 w = w + speed
-            mass, centre, tensor = link.inertia
+            mass, centre, tensor = link.inertia.moved(link.X)
             force = mass * (a + _cross(wd, centre) + _cross(w, _cross(w, centre)))
             moments.append(_turned(wd, tensor) + _cross(w, _turned(w, tensor)) + _cross(centre, force))
             turns.append(R)
@@ -143,7 +187,7 @@ class Chain:
 
 def _motion(link: ChainLink, q: Array) -> tuple[Array, Array]:
     """How a link's frame stands in the one before, for joint values (k,): (k, 3, 3) and (k, 3)."""
-    R, p = link.X[:3, :3], link.X[:3, 3]
+    R, p = rotation(link.turn), link.place
     if link.prismatic:
         return np.broadcast_to(R, (len(q), 3, 3)), p + q[:, None] * (R @ link.axis)
     x, y, z = link.axis
@@ -162,8 +206,3 @@ def _cross(a: Array, b: Array) -> Array:
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
-
-
-def servo_inertia(chain: Chain, poses: Sequence[Array]) -> list[float]:
-    """Joint inertias that a servo's fixed gains are made for: means over some poses, (n,) each."""
-    return list(np.mean([np.diag(chain.mass_matrix(q)) for q in poses], axis=0).tolist())

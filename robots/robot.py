@@ -294,6 +294,11 @@ class Robot:
         ideal = () if self.is_base else (IDEAL,)
         return one_of(f"body of {self.name}", asked, dict.fromkeys((*self.bodies, *ideal)))
 
+    def with_body(self, name: str) -> Self:
+        """The same robot, of which another body is the usual one; see `body_name`."""
+        chosen = self.body_name(name)
+        return replace(self, bodies={chosen: self.body(chosen), **self.bodies})
+
     def body(self, name: str = "") -> Callable[..., Any]:
         """What makes a body: of an arm an `ArmMaker`.
 

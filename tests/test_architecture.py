@@ -22,10 +22,10 @@ ORDER = (
     "vrs",
     # The robots.
     "robots.solids", "robots.base", "robots.robot", "robots.chain", "robots.description", "robots.bullet",
-    "robots.mujoco", "robots.onboard", "robots.simulated", "robots.mobile", "robots.described",
+    "robots.mujoco", "robots.drives", "robots.onboard", "robots.simulated", "robots.mobile", "robots.described",
     "robots.ipr", "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
-    "interfaces.system", "interfaces.timer", "interfaces.messages",
+    "interfaces.system", "interfaces.pipes", "interfaces.timer", "interfaces.messages",
     # The network; what is asked of a personal robot.
     "interfaces.link", "interfaces.middleware", "interfaces.jobs",
     # What serves an engine, and its clients; both sites; what a run is.
@@ -83,6 +83,27 @@ def violations(path, package):
     for name, line in imports(tree, top_only=True):
         if name.split(".")[0] in HEAVY or name == "scipy.interpolate":
             yield f"{path}:{line} imports {name} when it is loaded"
+
+
+POSIX = {"fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty", "uvloop"}
+"""Modules that some systems haven't."""
+ONLY_SOME = re.compile(
+    r"os\.(fork|sched_|setsid|killpg|nice|mkfifo|openpty|fchmod|O_CLOEXEC|O_NONBLOCK)|AF_UNIX|SEQPACKET|pass_fds"
+    r"|add_signal_handler"
+)
+
+
+def test_what_only_some_systems_have_is_asked_for_in_its_adapters() -> None:
+    """Each of them does without it where it isn't there; the rest knows no system."""
+    adapters = {HOME / "interfaces/system.py", HOME / "interfaces/pipes.py"}
+    found = []
+    for path in FILES:
+        text = path.read_text(encoding="utf-8")
+        named = {name.split(".")[0] for name, _ in imports(ast.parse(text))} & POSIX
+        if path not in adapters:
+            found += [f"{path.relative_to(HOME)}: {name}" for name in sorted(named)]
+            found += [f"{path.relative_to(HOME)}: {hit[0]}" for hit in ONLY_SOME.finditer(text)]
+    assert found == []
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOME)))

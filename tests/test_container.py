@@ -38,7 +38,7 @@ def test_the_python_is_ours() -> None:
     image = next(rest for word, rest in instructions() if word == "FROM")
     wanted = tomllib.loads((HOME / "pyproject.toml").read_text())["project"]["requires-python"]
     assert image.startswith("python:3.11-")
-    assert wanted == ">=3.11,<3.12"
+    assert wanted == ">=3.11"
 
 
 def test_it_serves_to_the_host_by_token_and_not_as_root(tmp_path: Path) -> None:

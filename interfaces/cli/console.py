@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 import typer
 
 from interfaces.cli.options import DialectName, RobotName, Tip, dialect_of, option, program_files, val_robot
-from interfaces.system import module_process, software
+from interfaces.system import module_process, on_signal, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import home
@@ -136,8 +136,7 @@ async def _piped(monitor: TerminalMonitor, clock: Clock) -> None:
     from interfaces.val2.monitor.teletype import Pipe
 
     pipe = Pipe(monitor, clock, source=sys.stdin.fileno())
-    with contextlib.suppress(NotImplementedError):
-        asyncio.get_running_loop().add_signal_handler(signal.SIGINT, pipe.interrupt)
+    on_signal(asyncio.get_running_loop(), signal.SIGINT, pipe.interrupt)
     await pipe.run()
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from interfaces.cli.options import Delay, Offset, Order, Out, RobotName, Seed, Tip, bars, option, robot_of
+from interfaces.cli.options import BodyName, Delay, Offset, Order, Out, RobotName, Seed, Tip, bars, option, robot_of
 from interfaces.system import written
 from robots.robot import USUAL
 from vrs.errors import FormatError
@@ -39,6 +39,7 @@ def demo(
     commands: Annotated[Path | None, option("FILE", "Plan file, JSON lines; the demo's own without it.")] = None,
     name: RobotName = USUAL,
     tip: Tip = "",
+    body: BodyName = "",
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
@@ -55,7 +56,7 @@ def demo(
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    robot = robot_of(name, tip)
+    robot = robot_of(name, tip).with_body(body)
     plan = default_plan(robot.arm) if commands is None else read_plan(commands, robot.arm)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)

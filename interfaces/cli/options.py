@@ -9,12 +9,14 @@ import re
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
+from interfaces.system import on_signal
 from robots.robot import FOUND, USUAL, HeadCamera, described, load
 from vrs.errors import FormatError, InvalidValueError
 
@@ -103,7 +105,7 @@ Tip: TypeAlias = Annotated[
     str, option("--tip LINK", "Of a description: the link at the end of the arm; as FILE#LINK says it, too.")
 ]
 BodyName: TypeAlias = Annotated[
-    str, option("--body BODY", "What is real of an arm: bullet, ideal or another of its own.")
+    str, option("--body BODY", "What is real of the robot: bullet, mujoco, ideal or another of its own.")
 ]
 ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
 """Unless others are asked for."""
@@ -446,6 +448,14 @@ def end_with_input(ended: asyncio.Event) -> None:
     except PermissionError:
         # Files and /dev/null can't be waited for: there's always something to read, or the end.
         ended.set()
+    except NotImplementedError:
+        # Loops of some systems wait for sockets alone.
+        def wait() -> None:
+            while os.read(source, 4096):
+                pass
+            loop.call_soon_threadsafe(ended.set)
+
+        threading.Thread(target=wait, daemon=True).start()
 
 
 def end_on_signal(ended: asyncio.Event) -> None:
@@ -454,7 +464,7 @@ def end_on_signal(ended: asyncio.Event) -> None:
 
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
+        on_signal(loop, number, ended.set)
 
 
 ROUNDS = 2000

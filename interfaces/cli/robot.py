@@ -37,7 +37,7 @@ from interfaces.cli.options import (
     saying_policy,
     tokens_for,
 )
-from interfaces.system import software
+from interfaces.system import run_loop, software
 from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
@@ -72,8 +72,6 @@ def thin_client(
         InvalidValueError: If something isn't allowed.
         FormatError: If a file or the address can't be used.
     """
-    import uvloop
-
     from interfaces.link.proxy import parse_address
     from interfaces.rsp.live import bind, keys_of
     from interfaces.rsp.model import read_model
@@ -87,7 +85,7 @@ def thin_client(
     tokens = tokens_for(where.host, token_file)
     keys = None if tokens is None else keys_of(tokens, token_file)
     sock = bind(where.host, where.port)
-    _end(uvloop.run(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof)))
+    _end(run_loop(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof)))
 
 
 def _end(problem: str) -> None:
@@ -196,8 +194,6 @@ def robot(
         return
     if rsp_model is not None:
         raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
-    import uvloop
-
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.runtime.live.robot import LiveRobot
@@ -248,7 +244,7 @@ def robot(
         says = f"{made.name}, {kind}", remark
         return await _serve(LiveRobot(made, access, server=software()), says, address, allowed, until_eof=until_eof)
 
-    _end(uvloop.run(main()))
+    _end(run_loop(main()))
 
 
 def _offset(text: str) -> float | None:

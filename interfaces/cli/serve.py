@@ -48,7 +48,7 @@ from interfaces.cli.options import (
     start_robot,
     untaken,
 )
-from interfaces.system import software
+from interfaces.system import run_loop, software
 from robots.robot import USUAL, HeadCamera
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
@@ -141,8 +141,6 @@ def serve(
     until_eof: Annotated[bool, option("--until-eof", "End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
-    import uvloop
-
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
     from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
@@ -233,7 +231,7 @@ def serve(
             behind, architecture, folder,
         ))  # fmt: skip
     taught = _Class(own, reached_as[0] if reached_as else "", teacher) if class_ else None
-    uvloop.run(_serve(serving, access, host, port, allowed, taught, until_eof=until_eof))
+    run_loop(_serve(serving, access, host, port, allowed, taught, until_eof=until_eof))
 
 
 def _own(path: Path, k: int, robot: Robot) -> Path:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import socket
+import subprocess
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
 from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
-from interfaces.system import module_process
+from interfaces.pipes import start
 from robots.bullet.rooms import Room
 from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
 from robots.robot import USUAL_BASE
@@ -74,12 +74,7 @@ async def camera_process(setup: Setup) -> AsyncIterator[Ask]:
     Raises:
         CameraError: If it doesn't start; of what is asked, if there's no answer.
     """
-    ours, theirs = socket.socketpair()
-    with theirs:
-        command, environment = module_process("interfaces.media.camera_process", str(theirs.fileno()))
-        process = await asyncio.create_subprocess_exec(
-            *command, stdin=asyncio.subprocess.DEVNULL, pass_fds=(theirs.fileno(),), env=environment
-        )
+    process, ours = start("interfaces.media.camera_process")
     reader, writer = await asyncio.open_connection(sock=ours)
 
     async def ask(order: Order, within: float) -> News:
@@ -103,11 +98,10 @@ async def camera_process(setup: Setup) -> AsyncIterator[Ask]:
     finally:
         writer.close()
         try:
-            async with asyncio.timeout(1.0):
-                await process.wait()
-        except TimeoutError:
+            await asyncio.to_thread(process.wait, 1.0)
+        except subprocess.TimeoutExpired:
             process.kill()
-            await process.wait()
+            process.wait()
 
 
 class LiveCamera:

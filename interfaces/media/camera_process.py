@@ -5,7 +5,6 @@ It has a world of its own and never touches the robot's physics. It ends when th
 
 from __future__ import annotations
 
-import contextlib
 import os
 import socket
 import sys
@@ -13,6 +12,7 @@ from typing import BinaryIO
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
 from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.system import be_nice
 from robots.mobile.camera import Look, Sight
 from robots.robot import HeadCamera, load
 from vrs.clock import WallClock
@@ -31,8 +31,7 @@ def run(connection: socket.socket) -> int:
     Returns:
         The exit status: 0, or 2 if something came that isn't a message, or the robot has no camera.
     """
-    with contextlib.suppress(OSError):
-        os.nice(NICE)
+    be_nice(NICE)
     orders = connection.makefile("rb")
     try:
         setup = _order(orders)

@@ -24,6 +24,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from interfaces.recording.channels import CHANNELS
+from interfaces.system import PLAIN_READ
 from vrs.errors import FormatError
 from vrs.model import Array
 
@@ -70,7 +71,7 @@ class FileSource:
         """
         self.where = str(path)
         try:
-            self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+            self._file = os.open(path, PLAIN_READ)
         except OSError as error:
             raise FormatError(self.where, os.strerror(error.errno or 0)) from None
         self.size = 0

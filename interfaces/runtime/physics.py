@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import socket
 import subprocess
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,6 +15,7 @@ import numpy as np
 
 from interfaces.messages.control import Ping
 from interfaces.messages.sites import Report
+from interfaces.pipes import MessageSocket, start
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     ROWS_MOST,
@@ -32,7 +32,6 @@ from interfaces.runtime.physics_messages import (
     decode_news,
     encode,
 )
-from interfaces.system import module_process
 from interfaces.teleop import JointReference, RobotHost
 from robots.robot import IDEAL, Robot
 from vrs.checks import finite_array, number_in, validated, within
@@ -55,10 +54,6 @@ _END_TIME = 2.0
 """How long it may take to come to rest and end [s]."""
 _STATUS_TIME = 0.05
 """How long to wait for the exit status of a process that has closed its socket [s]."""
-_BUFFER = 1 << 20
-"""Bytes that wait in either direction, as far as the system grants them."""
-_READS_MOST = 1024
-"""Most messages taken in at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,26 +131,11 @@ class PhysicsProcess:
         self._n, self._run = limits.dof, 0
         self._heard, self._ready, self._silent = clock.now(), False, False
         self._ended: ProcessEnded | None = None
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        for end in (ours, theirs):
-            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
-        self._socket = ours
-        command, environment = module_process("interfaces.runtime.physics_process", str(theirs.fileno()))
         try:
-            self._process = subprocess.Popen(
-                command,
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                start_new_session=True,
-                env=environment,
-            )
+            self._process, connection = start("interfaces.runtime.physics_process")
         except OSError as problem:
-            ours.close()
             raise PhysicsStartError(str(problem)) from problem
-        finally:
-            theirs.close()
-        ours.setblocking(False)
+        self._socket = MessageSocket(connection, MESSAGE_MOST)
         bounds = (limits.q_min, limits.q_max, limits.qd_max, limits.qdd_max, limits.qddd_max)
         self._send(
             PhysicsSetup(
@@ -208,7 +188,7 @@ class PhysicsProcess:
         Raises:
             InvalidValueError: If no load has that mass.
         """
-        from robots.bullet import Payload
+        from robots.simulated import Payload
 
         return self._send(Attach(Payload(mass=mass).mass))
 
@@ -223,22 +203,13 @@ class PhysicsProcess:
             now: By the robot's clock [s].
         """
         events: list[Event] = []
-        for _ in range(_READS_MOST):
-            if self._ended is not None:
-                break
-            try:
-                data = self._socket.recv(MESSAGE_MOST)
-            except BlockingIOError:
-                break
-            except ConnectionError:
-                data = b""
-            if not data:
-                events.append(self._end())
-                break
+        for data in () if self._ended is not None else self._socket.receive():
             news: News = decode_news(data)
             self._heard, self._silent = now, False
             self._ready = self._ready or isinstance(news, PhysicsReady)
             events.append(news)
+        if self._ended is None and self._socket.ended:
+            events.append(self._end())
         if self._ended is None and not self._silent and now - self._heard > self._patience:
             if not self._ready:
                 self._process.kill()
@@ -282,13 +253,7 @@ class PhysicsProcess:
 
     def _send(self, order: Order) -> bool:
         """Send a message, if there's room for it."""
-        if self._ended is not None:
-            return False
-        try:
-            self._socket.send(encode(order))
-        except (BlockingIOError, ConnectionError):
-            return False
-        return True
+        return self._ended is None and self._socket.send(encode(order))
 
 
 class References:

@@ -1,4 +1,4 @@
-"""What the process of the physics and its parent tell each other, over a socket that keeps messages whole.
+"""What the process of the physics and its parent tell each other, a message of `interfaces.pipes` each.
 
 Ticks are numbered by the robot's clock: tick k is due at k times the tick's length, and then the body goes to where
 its reference is to be at that time.

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import gc
 import os
-import select
 import socket
 import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from threading import Event
 
+from interfaces.pipes import MessageSocket
 from interfaces.runtime.physics_messages import (
     MESSAGE_MOST,
     Measurement,
@@ -75,44 +76,35 @@ def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
 class ParentSocket:
     """The socket to the parent; nothing waits for it."""
 
-    def __init__(self, connection: socket.socket, process: int) -> None:
-        self._socket, self._process = connection, process
+    def __init__(self, connection: MessageSocket, process: int) -> None:
+        self._socket, self.process = connection, process
+        self._come: deque[bytes] = deque()
         self.unsent: deque[News] = deque(maxlen=_UNSENT_MOST)
         self.gone = False
 
     def wait(self, seconds: float) -> bytes | None:
         """Wait for a message, no longer than this [s]; None if there's none."""
-        if self.gone:
-            select.select([], [], [], max(seconds, 0.0))
-            return None
-        if not select.select([self._socket], [], [], max(seconds, 0.0))[0]:
-            return None
-        try:
-            data = self._socket.recv(MESSAGE_MOST)
-        except BlockingIOError:
-            return None
-        except OSError:
-            data = b""
-        self.gone = not data
-        return data or None
+        if not self._come and self.gone:
+            Event().wait(max(seconds, 0.0))
+        elif not self._come and self._socket.wait(seconds):
+            self._come.extend(self._socket.receive())
+            self.gone = self._socket.ended
+        return self._come.popleft() if self._come else None
 
     def tell(self, news: list[News]) -> None:
         """Send what there is; of what doesn't fit only the measurements are lost."""
         self.unsent.extend(news)
         while self.unsent and not self.gone:
             message = self.unsent.popleft()
-            try:
-                self._socket.send(encode(message))
-            except BlockingIOError:
+            if not self._socket.send(encode(message)):
+                self.gone = self.gone or self._socket.ended
                 kept = [m for m in (message, *self.unsent) if not isinstance(m, Measurement)]
                 self.unsent = deque(kept, maxlen=_UNSENT_MOST)
                 return
-            except OSError:
-                self.gone = True
 
     def look(self) -> None:
         """Notice that the parent has ended, even if somebody else has inherited its end of the socket."""
-        self.gone = self.gone or os.getppid() != self._process
+        self.gone = self.gone or os.getppid() != self.process
 
 
 def run(connection: socket.socket) -> int:
@@ -124,15 +116,17 @@ def run(connection: socket.socket) -> int:
     Returns:
         The exit status: 0, 1 if the body failed, 2 if there was no setup.
     """
-    connection.settimeout(_SETUP_TIME)
+    messages = MessageSocket(connection, MESSAGE_MOST)
+    parent, since, data = ParentSocket(messages, os.getppid()), WallClock(), None
+    while data is None and not parent.gone and since.now() < _SETUP_TIME:
+        data = parent.wait(_SETUP_TIME - since.now())
     try:
-        setup = decode_order(connection.recv(MESSAGE_MOST))
-    except (OSError, FormatError):
+        setup = None if data is None else decode_order(data)
+    except FormatError:
         return 2
     if not isinstance(setup, PhysicsSetup):
         return 2
-    connection.setblocking(False)
-    clock, parent = WallClock.since(setup.origin), ParentSocket(connection, setup.parent)
+    clock, parent.process = WallClock.since(setup.origin), setup.parent
     with tick_body(setup) as body:
         realtime = hasten(2)
         # What is there now stays: the collector needn't look through it again and again between two ticks.
@@ -149,8 +143,9 @@ def run(connection: socket.socket) -> int:
             prismatic=setup.prismatic,
         )
         _tick(loop, parent, clock)
-    connection.settimeout(_LAST_WORDS)
+    messages.flush(_LAST_WORDS)
     parent.tell(loop.take())
+    messages.flush(_LAST_WORDS)
     return 1 if loop.failed else 0
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from interfaces.link.proxy import Address
 from interfaces.messages.control import Role, covers
 from interfaces.stream.invitations import Invitations
+from interfaces.system import PLAIN_READ
 from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32
@@ -101,7 +102,7 @@ def read_tokens(path: Path) -> dict[Role, str]:
     """
     where = f"token file {path}"
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        descriptor = os.open(path, PLAIN_READ)
     except OSError as error:
         raise FormatError(where, error.strerror or "can't be opened") from None
     state = os.fstat(descriptor)
@@ -110,7 +111,7 @@ def read_tokens(path: Path) -> dict[Role, str]:
         raise FormatError(where, "it isn't a file")
     with open(descriptor, "rb") as file:
         mode = stat.S_IMODE(state.st_mode)
-        if mode != 0o600:
+        if os.name == "posix" and mode != 0o600:
             raise FormatError(where, f"its mode must be 0600, so that nobody else reads it; it's {mode:04o}")
         data = file.read(LARGEST_FILE + 1)
     if len(data) > LARGEST_FILE:
@@ -151,11 +152,11 @@ def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token
     """
     tokens = {role: make_token(random_bytes) for role in Role}
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except OSError as error:
         raise FormatError(f"token file {path}", error.strerror or "can't be made") from None
     with open(descriptor, "w", encoding="ascii") as file:
-        os.fchmod(descriptor, 0o600)
+        path.chmod(0o600)
         file.writelines(f"{role} {token}\n" for role, token in tokens.items())
     return tokens
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import resource
 import socket
 from asyncio.transports import BaseTransport, Transport
 from collections import deque
@@ -22,6 +21,7 @@ from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
 from interfaces.stream.limits import Bucket, Strangers
+from interfaces.system import open_files
 from vrs.checks import validated, within
 from vrs.clock import processor_time
 from vrs.errors import FormatError
@@ -40,7 +40,6 @@ BACKLOG = 128
 again: a short one lets a newcomer in sooner."""
 FILES = 16384
 """Open files that a server asks the system for; it does with fewer."""
-_FILES = resource.RLIMIT_NOFILE
 FAREWELL = 2.0
 """Time for a closing handshake, and for what waits to be sent [s]."""
 TURNS = 4
@@ -117,7 +116,7 @@ class ConnectionState(ServerState):
         super().__init__()
         self.limits = limits
         self.turns = Turns()
-        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, files_allowed() // 4)))
+        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, open_files(FILES) // 4)))
 
 
 class _Bounded(asyncio.Protocol):
@@ -491,14 +490,6 @@ async def _cut_off_overdue(state: ConnectionState) -> None:
                 connection.transport.abort()
             # A thousand may be overdue at once: others have their turn in between.
             await asyncio.sleep(0)
-
-
-def files_allowed() -> int:
-    """How many files this process may open, each connection being one; it may open more if the system lets it."""
-    soft, hard = (FILES if most == resource.RLIM_INFINITY else most for most in resource.getrlimit(_FILES))
-    if soft < min(FILES, hard):
-        resource.setrlimit(_FILES, (min(FILES, hard), resource.getrlimit(_FILES)[1]))
-    return max(soft, min(FILES, hard))
 
 
 def _abort_all(connections: Iterable[object]) -> None:

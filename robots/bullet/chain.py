@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
-from robots.bullet.serial_arm import quaternion
 from robots.bullet.world import World
-from robots.chain import Chain, principal
+from robots.chain import Chain, quaternion
 from robots.robot import Closing
 
 _FREE_SPEED = 1e9
@@ -26,16 +25,16 @@ class BulletChain(Closing):
         bullet, links = self.world.bullet, chain.links
         n = len(links)
         self._joints, self._zero = tuple(range(n)), (0.0,) * n
-        turned = [principal(link.inertia.tensor) for link in links]
-        self._body = body = int(
+        turned = [link.principal() for link in links]
+        self.body = body = int(
             bullet.createMultiBody(
                 baseMass=0.0,
                 linkMasses=[1.0] * n,
                 linkCollisionShapeIndices=[-1] * n,
                 linkVisualShapeIndices=[-1] * n,
-                linkPositions=[link.X[:3, 3].tolist() for link in links],
-                linkOrientations=[quaternion(link.X[:3, :3]) for link in links],
-                linkInertialFramePositions=[link.inertia.centre.tolist() for link in links],
+                linkPositions=[link.place.tolist() for link in links],
+                linkOrientations=[list(link.turn) for link in links],
+                linkInertialFramePositions=[link.centre.tolist() for link in links],
                 linkInertialFrameOrientations=[quaternion(axes) for _, axes in turned],
                 linkParentIndices=list(range(n)),
                 linkJointTypes=[
@@ -44,6 +43,7 @@ class BulletChain(Closing):
                 linkJointAxis=[link.axis.tolist() for link in links],
             )
         )
+        """PyBullet's id of the chain."""
         # Damping first, mass and inertia after it, and all before the first inverse-dynamics or mass-matrix call:
         # PyBullet caches the tree that answers those and never looks at the masses again.
         for j in self._joints:
@@ -60,20 +60,20 @@ class BulletChain(Closing):
         """Put the joints into a state."""
         self._q, self._qd = list(q), list(qd)
         for j in self._joints:
-            self.world.bullet.resetJointState(self._body, j, q[j], targetVelocity=qd[j])
+            self.world.bullet.resetJointState(self.body, j, q[j], targetVelocity=qd[j])
 
     def dynamics(self) -> tuple[Sequence[Sequence[float]], Sequence[float]]:
         """Mass matrix without armatures, and torques of gravity and speeds, in the present state."""
         bullet = self.world.bullet
-        M = bullet.calculateMassMatrix(self._body, self._q)
-        return M, bullet.calculateInverseDynamics(self._body, self._q, self._qd, self._zero)
+        M = bullet.calculateMassMatrix(self.body, self._q)
+        return M, bullet.calculateInverseDynamics(self.body, self._q, self._qd, self._zero)
 
     def step(self, tau: Sequence[float]) -> tuple[list[float], list[float]]:
         """Apply torques for a step, and say where the joints are then, and how fast."""
         bullet = self.world.bullet
-        bullet.setJointMotorControlArray(self._body, self._joints, bullet.TORQUE_CONTROL, forces=tau)
+        bullet.setJointMotorControlArray(self.body, self._joints, bullet.TORQUE_CONTROL, forces=tau)
         bullet.stepSimulation()
-        states = bullet.getJointStates(self._body, self._joints)
+        states = bullet.getJointStates(self.body, self._joints)
         self._q, self._qd = [s[0] for s in states], [s[1] for s in states]
         return self._q, self._qd
 

@@ -21,15 +21,15 @@ from typing_extensions import override
 from robots.bullet.rooms import Block, Column, Room
 from robots.robot import Closing
 from robots.solids import LinkShape
-from vrs.errors import VrsError
+from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
 
 class WorldClosedError(VrsError):
-    """A PyBullet world used after it was closed."""
+    """A world of physics used after it was closed."""
 
     def __init__(self) -> None:
-        super().__init__("this PyBullet world is closed: make a new one")
+        super().__init__("this world of physics is closed: make a new one")
 
 
 class LostError(VrsError):
@@ -50,6 +50,8 @@ def load_pybullet() -> Any:
         with open(os.devnull, "wb") as sink:
             os.dup2(sink.fileno(), 2)
         import pybullet
+    except ImportError:
+        raise InvalidValueError("body", "bullet", "with PyBullet installed: pip install pybullet") from None
     finally:
         os.dup2(saved, 2)
         os.close(saved)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from robots.chain import Chain, ChainLink, Inertia, together
+from robots.chain import Chain, ChainLink, Inertia, quaternion, together
 from robots.description.description import Description, Joint, JointKind
 from vrs.model import Array
 
@@ -64,16 +64,16 @@ def _link(joint: Joint, X: Array, inertia: Inertia, notes: list[str]) -> ChainLi
     effort = joint.effort if joint.effort else math.inf
     if effort == math.inf:
         notes.append(f"joint {joint.name} states no effort: its drive has no limit")
-    prismatic = joint.kind is JointKind.PRISMATIC
     return ChainLink(
-        X,
-        joint.axis,
-        prismatic,
+        X[:3, 3],
+        quaternion(X[:3, :3]),
         Inertia(mass, centre, tensor),
-        effort,
-        joint.armature,
-        joint.damping,
-        joint.friction,
+        axis=joint.axis,
+        prismatic=joint.kind is JointKind.PRISMATIC,
+        effort=effort,
+        armature=joint.armature,
+        viscous=joint.damping,
+        coulomb=(joint.friction, -joint.friction),
     )
 
 

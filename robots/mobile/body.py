@@ -20,8 +20,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from typing_extensions import override
 
-from robots.bullet.serial_arm import RigidLink, quaternion
 from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, LostError, RoomBodies, World
+from robots.chain import Inertia, quaternion, together
 from robots.mobile.chassis import Chassis, MobileReality
 from robots.mobile.robot import MobileRobot
 from vrs.checks import finite, validated, within
@@ -117,10 +117,9 @@ def load_chassis(
         base: True wheel base [m].
     """
     bullet = world.bullet
-    mass, centre, inertia = chassis.rigid()
-    rigid = RigidLink(0.0, 0.0, 0.0, mass, centre, inertia)
-    if (load := reality.payload) is not None:
-        rigid = rigid.with_body(load.mass, load.centre, load.inertia)
+    load = reality.payload
+    loads = () if load is None else (Inertia(load.mass, load.centre, load.inertia),)
+    rigid = together((Inertia(*chassis.rigid()), *loads))
     diagonal, R_principal = rigid.principal()
     height = chassis.height - chassis.ground_clearance
     box = bullet.createCollisionShape(

@@ -19,9 +19,9 @@ from typing import Annotated
 import numpy as np
 
 from robots.base import Footprint
-from robots.bullet.serial_arm import Payload
 from robots.onboard.driving import drive_limits
 from robots.onboard.laser import LaserModel
+from robots.simulated import Payload
 from vrs.checks import number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from robots.chain import Chain, principal
+from robots.chain import Chain, quaternion
 from robots.robot import Closing
 from vrs.errors import InvalidValueError
-from vrs.model import Array
 
 
 def load_mujoco() -> Any:
@@ -40,16 +39,16 @@ class MujocoChain(Closing):
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
         body = spec.worldbody
         for link in chain.links:
-            body = body.add_body(pos=link.X[:3, 3], quat=_turn(mujoco, link.X[:3, :3]))
+            body = body.add_body(pos=link.place, quat=_w_first(link.turn))
             # Its own check refuses inertias that break the triangle inequality, as measured ones do.
             body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
             kind = mujoco.mjtJoint.mjJNT_SLIDE if link.prismatic else mujoco.mjtJoint.mjJNT_HINGE
             body.add_joint(type=kind, axis=link.axis)
         model = spec.compile()
         for j, link in enumerate(chain.links, start=1):
-            diagonal, axes = principal(link.inertia.tensor)
-            model.body_mass[j], model.body_ipos[j] = link.inertia.mass, link.inertia.centre
-            model.body_inertia[j], model.body_iquat[j] = diagonal, _turn(mujoco, axes)
+            diagonal, axes = link.principal()
+            model.body_mass[j], model.body_ipos[j] = link.inertia.mass, link.centre
+            model.body_inertia[j], model.body_iquat[j] = diagonal, _w_first(quaternion(axes))
         data = mujoco.MjData(model)
         mujoco.mj_setConst(model, data)
         self._mujoco, self._model, self._data = mujoco, model, data
@@ -82,8 +81,7 @@ class MujocoChain(Closing):
         """Nothing is held."""
 
 
-def _turn(mujoco: Any, R: Array) -> Array:
-    """A rotation matrix as MuJoCo's quaternion (w, x, y, z)."""
-    turn = np.empty(4)
-    mujoco.mju_mat2Quat(turn, np.ascontiguousarray(R).reshape(9))
-    return turn
+def _w_first(turn: Sequence[float]) -> list[float]:
+    """A quaternion (x, y, z, w) as MuJoCo has it."""
+    x, y, z, w = turn
+    return [w, x, y, z]

@@ -129,6 +129,21 @@ def test_its_recording_says_what_the_run_said(demo: Path, tmp_path: Path) -> Non
     assert last == pytest.approx([0.5, 0.05 - 2e-3, -1.0], abs=1e-6)
 
 
+def test_the_puma_follows_alike_in_both_worlds_of_physics(tmp_path: Path) -> None:
+    (tmp_path / "plan.jsonl").write_text("""{"title": "Turn"}
+{"issue": 0.0, "execute": 0.5, "move": [30, 20, 10, 40, -30, 20], "speed": 0.8}
+{"issue": 0.5, "payload": {"mass_kg": 1.5}}
+""")
+    found = {}
+    for body in ("bullet", "mujoco", "ideal"):
+        vrs("demo", "--body", body, "--commands", tmp_path / "plan.jsonl", "--out", tmp_path / body)
+        found[body] = json.loads((tmp_path / body / "summary.json").read_text())["errors"]["servo"]["joint_rms_deg"]
+    assert max(found["ideal"]) == 0.0
+    assert min(found["bullet"]) > 1e-3
+    # Encoders count: what one world rounds up, the other may round down.
+    assert found["mujoco"] == pytest.approx(found["bullet"], rel=0.05, abs=1e-3)
+
+
 class Snake:
     """A planar arm of n joints about z."""
 

@@ -53,7 +53,7 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     robot = robots.load("puma560")
     q = robot.arm.poses["ready"]
     still = np.tile(q, (20, 1)), np.zeros((20, 6)), np.zeros((20, 6))
-    for name in ("bullet", IDEAL):
+    for name in ("bullet", "mujoco", IDEAL):
         with robot.body(name)(q, friction=False) as body:
             body.attach(2.5)
             measured = body.follow(body.prepare(*still))
@@ -63,8 +63,11 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     assert robot.usual_body == "bullet"
     assert robot.body() is robot.bodies["bullet"]
     assert Robot("bare", robot.model).usual_body == IDEAL
-    with pytest.raises(InvalidValueError, match="body of puma560 must be one of bullet, ideal; given: 'jelly'"):
+    with pytest.raises(InvalidValueError, match="puma560 must be one of bullet, mujoco, ideal; given: 'jelly'"):
         robot.body("jelly")
+    assert robot.with_body("mujoco").usual_body == "mujoco"
+    assert robot.with_body(EXACT).body() is robot.body(IDEAL)
+    assert set(robot.with_body("mujoco").bodies) == set(robot.bodies)
     assert robot.body_name(EXACT) == robot.body_name(IDEAL) == IDEAL
     assert robot.body(EXACT) is robot.body(IDEAL)
     with pytest.raises(InvalidValueError, match="one of bullet, bare"):

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.bullet import Payload, Reality
-from robots.bullet.drives import Drives, solve_six
+from robots.drives import Drives, solve_six
 from robots.onboard.servo import Servo, ServoGains
+from robots.simulated import Payload, Reality
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
@@ -86,7 +86,6 @@ def test_a_lasting_error_is_met_with_stiffness_and_a_growing_one_with_damping() 
         {"encoder_counts": 0},
         {"encoder_counts": 1.5},
         {"rotor_inertia": 1},
-        {"ideal": None},
     ],
 )
 def test_reality_refuses(values: dict[str, object]) -> None:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from roboticstoolbox.models.DH import Puma560
 from scipy.spatial.transform import Rotation
 
-from robots.bullet import Payload
 from robots.chain import Chain, ChainLink, Inertia, together
-from robots.onboard.servo import ServoGains
-from robots.puma560.body import puma_links
-from robots.puma560.parameters import default_limits
-from robots.simulated import WORLDS, SimulatedArm
+from robots.simulated import WORLDS, chain_arm
 from vrs.model import Array, Limits
 
 
@@ -28,31 +25,22 @@ def ball(rng: np.random.Generator) -> Inertia:
     return together(points)
 
 
-def chain(seed: int, n: int, **drives: float) -> Chain:
+def chain(seed: int, n: int, **drives: Any) -> Chain:
     """Joints of both kinds about any axes."""
     rng = np.random.default_rng(seed)
     links = []
     for _ in range(n):
         axis = rng.normal(size=3)
         sliding = rng.random() < 0.3
-        links.append(ChainLink(pose(rng, 0.4), axis / np.linalg.norm(axis), sliding, ball(rng), **drives))
+        X = pose(rng, 0.4)
+        turn = Rotation.from_matrix(X[:3, :3]).as_quat()
+        axis = axis / np.linalg.norm(axis)
+        links.append(ChainLink(X[:3, 3], turn, ball(rng), pose(rng, 0.1), axis, sliding, **drives))
     return Chain(tuple(links), pose(rng, 0.1))
 
 
 def limits(n: int) -> Limits:
     return Limits(-2.0 * np.ones(n), 2.0 * np.ones(n), 2.0 * np.ones(n), 8.0 * np.ones(n))
-
-
-def puma() -> Chain:
-    """The PUMA 560 with joint frames for the Denavit-Hartenberg ones."""
-    links, before = [], np.eye(4)
-    for link in puma_links():
-        c, s = round(np.cos(link.alpha)), round(np.sin(link.alpha))
-        X = np.array([[1.0, 0, 0, link.a], [0, c, -s, 0], [0, s, c, link.d], [0, 0, 0, 1]])
-        inertia = Inertia(link.mass, link.centre, link.inertia).moved(X)
-        links.append(ChainLink(before, np.array([0.0, 0.0, 1.0]), False, inertia))
-        before = X
-    return Chain(tuple(links), before)
 
 
 def states(n: int, count: int) -> tuple[Array, Array, Array]:
@@ -69,28 +57,13 @@ def test_the_worlds_dynamics_are_those_of_the_chain(world: str, n: int) -> None:
     np.testing.assert_allclose(
         links.inverse_dynamics(q[4:5], qd[4:5], qdd[4:5], gravity=9.81)[0], tau[4], rtol=1e-12
     )
-    with SimulatedArm(world, links, limits(n), np.zeros(n), friction=False) as arm:
+    with chain_arm(world, links, limits(n), np.zeros(n), friction=False) as arm:
         for row in zip(q, qd, qdd, tau, strict=True):
             arm.place(row[0], row[1])
             arm.apply(row[3])
             got = (arm.qd - row[1]) / 1e-3
             assert np.abs(got - row[2]).max() <= 1e-9 * np.abs(row[2]).max()
             np.testing.assert_allclose(arm.q, row[0] + 1e-3 * arm.qd, rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("world", WORLDS)
-def test_the_pumas_accelerations_are_those_of_rne(world: str) -> None:
-    toolbox, bounds = Puma560(), default_limits()
-    for link in toolbox.links:
-        link.Jm, link.B, link.Tc = 0.0, 0.0, [0.0, 0.0]
-    rng = np.random.default_rng(0)
-    with SimulatedArm(world, puma(), bounds, np.zeros(6), friction=False) as arm:
-        for _ in range(300):
-            q = rng.uniform(bounds.q_min, bounds.q_max)
-            qd, qdd = rng.uniform(-1, 1, 6) * bounds.qd_max, rng.uniform(-1, 1, 6) * bounds.qdd_max
-            arm.place(q, qd)
-            arm.apply(toolbox.rne(q, qd, qdd))
-            assert np.abs((arm.qd - qd) / 1e-3 - qdd).max() <= 1e-9 * np.abs(qdd).max()
 
 
 def swing(n: int, seconds: float) -> tuple[Array, Array, Array]:
@@ -105,39 +78,40 @@ def height(links: Chain, q: Array) -> float:
     """Of the flange [m]."""
     X = np.eye(4)
     for link, value in zip(links.links, q, strict=True):
-        moved = np.eye(4)
+        moved, joint = np.eye(4), np.eye(4)
+        joint[:3, :3], joint[:3, 3] = Rotation.from_quat(link.turn).as_matrix(), link.place
         if link.prismatic:
             moved[:3, 3] = value * link.axis
         else:
             moved[:3, :3] = Rotation.from_rotvec(value * link.axis).as_matrix()
-        X = X @ link.X @ moved
-    return float((X @ links.flange)[2, 3])
+        X = X @ joint @ moved
+    return float((X @ links.links[-1].X @ links.flange)[2, 3])
 
 
-DRIVES = {"armature": 0.05, "viscous": 0.2, "coulomb": 0.3}
+DRIVES = {"armature": 0.05, "viscous": 0.2, "coulomb": (0.3, -0.2)}
 
 
 @pytest.mark.parametrize("world", WORLDS)
 def test_an_arm_of_seven_joints_follows_and_the_worlds_agree(world: str) -> None:
     links, references = chain(7, 7, **DRIVES), swing(7, 2.0)
-    with SimulatedArm(world, links, limits(7), np.zeros(7)) as arm:
+    with chain_arm(world, links, limits(7), np.zeros(7)) as arm:
         whole = arm.follow(arm.prepare(*references))
     assert np.degrees(np.sqrt(np.mean((whole.q - references[0]) ** 2, axis=0))).max() < 0.5
     assert not whole.saturated.any()
-    with SimulatedArm(world, links, limits(7), np.zeros(7)) as arm:
+    with chain_arm(world, links, limits(7), np.zeros(7)) as arm:
         parts = [
             arm.follow(arm.prepare(*(row[a:b] for row in references))) for a, b in ((0, 1), (1, 700), (700, 2000))
         ]
     np.testing.assert_array_equal(np.concatenate([part.q for part in parts]), whole.q)
-    with SimulatedArm("bullet", links, limits(7), np.zeros(7)) as arm:
+    with chain_arm("bullet", links, limits(7), np.zeros(7)) as arm:
         np.testing.assert_allclose(arm.follow(arm.prepare(*references)).q, whole.q, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("world", WORLDS)
 def test_coulomb_friction_holds_a_joint_that_is_pushed_too_little(world: str) -> None:
-    links = chain(2, 1, coulomb=5.0)
+    links = chain(2, 1, coulomb=(5.0, -5.0))
     level = links.inverse_dynamics(*np.zeros((3, 1, 1)), gravity=9.81)[0]
-    with SimulatedArm(world, links, limits(1), [0.0]) as arm:
+    with chain_arm(world, links, limits(1), [0.0]) as arm:
         for push, moves in ((4.9, False), (5.2, True)):
             for _ in range(50):
                 arm.apply(level + push)
@@ -155,7 +129,7 @@ def test_a_load_hangs_at_the_flange_and_efforts_end_at_their_limit(world: str) -
     added = held.inverse_dynamics(*rest, gravity=9.81) - links.inverse_dynamics(*rest, gravity=9.81)
     np.testing.assert_allclose(added[0], 2.0 * 9.81 * np.array(rise), atol=1e-8)
     zero, rows = np.zeros(3), np.zeros((300, 3))
-    with SimulatedArm(world, links, limits(3), zero, gains=ServoGains(friction=0.0)) as arm:
+    with chain_arm(world, links, limits(3), zero) as arm:
         arm.follow(arm.prepare(rows, rows, rows))
         assert np.abs(arm.q).max() < 1e-9
         arm.attach(2.0)
@@ -163,20 +137,7 @@ def test_a_load_hangs_at_the_flange_and_efforts_end_at_their_limit(world: str) -
         assert np.abs(sunk).max() > 1e-4
         arm.release()
         assert np.abs(arm.follow(arm.prepare(rows, rows, rows)).q[-1]).max() < 0.2 * np.abs(sunk).max()
-    with SimulatedArm(world, chain(3, 3, effort=2.0), limits(3), zero) as arm:
+    with chain_arm(world, chain(3, 3, effort=2.0), limits(3), zero) as arm:
         measured = arm.follow(arm.prepare(rows, rows, rows))
         assert np.abs(measured.tau).max() == 2.0
         assert measured.saturated.max() > 100
-
-
-def test_a_payload_of_the_puma_and_of_a_chain_are_one() -> None:
-    payload = Payload(2.5, (0.01, -0.02, 0.05), (0.01, 0.012, 0.008))
-    last = puma_links(payload)[-1]
-    parts = puma_links()[-1], payload
-    moved = np.eye(4)
-    moved[2, 3] = 0.05625
-    load = Inertia(payload.mass, payload.centre, payload.inertia).moved(moved)
-    made = together((Inertia(parts[0].mass, parts[0].centre, parts[0].inertia), load))
-    assert made.mass == pytest.approx(last.mass, rel=1e-14)
-    np.testing.assert_allclose(made.centre, last.centre, atol=1e-14)
-    np.testing.assert_allclose(made.tensor, last.inertia, atol=1e-14)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from robots import ipr
 from tests.vrs.plans import MODEL, A, B, C, D, plan, to
-from vrs import Engine, ManualClock, Profile, SteerCommand, Stop
+from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, Profile, SteerCommand, Stop
 from vrs.ledger import Receipt, Status
 from vrs.notes import ROUGH, NoteCode, text_of
 
@@ -89,3 +91,20 @@ def test_what_is_rejected_or_unknown_has_no_notes() -> None:
     assert old.status is Status.REJECTED
     assert engine.notes(old.command_id) == engine.notes(99) == ()
     assert engine.execute(to(B)).reason == ""
+
+
+def test_without_ruckig_a_move_from_motion_brakes_first_within_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some machines have no wheel of it."""
+    monkeypatch.setitem(sys.modules, "ruckig", None)
+    for profile in Profile:
+        engine = Engine(MODEL, q=MODEL.poses["nominal"])
+        for t, share in ((0.0, 0.3), (0.6, -0.2)):
+            q = MODEL.poses["nominal"] + share
+            r = engine.execute(
+                MotionCommand(JointTarget(q), execute_at=t, profile=profile, insertion=Insertion.REPLACE)
+            )
+            assert r.status is Status.ACCEPTED
+        times = np.linspace(0.0, engine.timeline.end, 2000)
+        assert np.abs(engine.timeline.sample(times, derivative=1) / MODEL.limits.qd_max).max() <= 1 + 1e-9
+        assert np.abs(engine.timeline.sample(times, derivative=2) / MODEL.limits.qdd_max).max() <= 1 + 1e-9
+        np.testing.assert_allclose(engine.timeline.final(), q, atol=1e-12)

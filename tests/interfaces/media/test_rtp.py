@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from interfaces import pipes
 from interfaces.media import CameraConfig, camera, live
 from interfaces.media.messages import Taken
 from interfaces.media.peers import VideoTrack
@@ -120,8 +121,8 @@ def test_without_the_extra_there_are_single_pictures_and_a_camera_that_fails_is_
     monkeypatch.setattr(live, "missing", lambda: "aiortc, av")
     monkeypatch.setattr(camera, "AGAIN", 0.2)
     commands = iter([(["/bin/false"], {})])
-    real = camera.module_process
-    monkeypatch.setattr(camera, "module_process", lambda *words: next(commands, None) or real(*words))
+    real = pipes.module_process
+    monkeypatch.setattr(pipes, "module_process", lambda *words: next(commands, None) or real(*words))
 
     async def session() -> None:
         async with site(CameraConfig(lens=LENS)) as here, here.page() as page:

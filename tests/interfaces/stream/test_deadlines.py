@@ -24,6 +24,7 @@ from interfaces.stream import sockets
 from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.limits import ClientLimits
 from interfaces.stream.sockets import SocketLimits
+from interfaces.system import open_files
 from tests.interfaces.stream import serving
 from tests.interfaces.stream.served import ServingHub, served
 from tests.interfaces.stream.test_server import frame, handshake
@@ -252,7 +253,7 @@ def test_some_pings_and_a_message_in_parts_are_taken() -> None:
 
 
 def test_a_server_asks_for_files_and_leaves_room_for_others() -> None:
-    assert sockets.ConnectionState(SocketLimits(strangers=100_000)).strangers.most <= sockets.files_allowed() // 4
+    assert sockets.ConnectionState(SocketLimits(strangers=100_000)).strangers.most <= open_files(sockets.FILES) // 4
 
 
 @pytest.mark.parametrize("first", [b"", SMALL, BODY, b"GET /small"], ids=["silent", "asks", "half", "begins"])

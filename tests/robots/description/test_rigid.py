@@ -65,7 +65,7 @@ def test_what_hangs_on_joints_that_nobody_moves_goes_with_the_link_before() -> N
     assert [link.prismatic for link in chain.links] == [False, True, False]
     assert [link.inertia.mass for link in chain.links] == pytest.approx([4 + 1 + 0.3, 2, 0.5 + 0.1 + 0.1])
     assert [link.effort for link in chain.links] == [50, 80, 9]
-    assert (chain.links[0].viscous, chain.links[0].coulomb) == (0.5, 0.1)
+    assert (chain.links[0].viscous, chain.links[0].coulomb) == (0.5, (0.1, -0.1))
     assert notes == ()
     # Torques at rest are the slope of the potential energy, fingers resting at their limit and their offset.
     rest, names = {"thumb": 0.01, "finger": 0.005}, ("waist", "rail", "wrist")

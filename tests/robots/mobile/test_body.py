@@ -12,12 +12,12 @@ import trimesh
 
 from robots import ipr
 from robots.bullet.rooms import read_room
-from robots.bullet.serial_arm import Payload
 from robots.bullet.world import LostError, WorldClosedError
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import CameraModel, Chassis, MobileReality, Senses, SonarModel
 from robots.mobile.robot import BareBody
+from robots.simulated import Payload
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 
