@@ -121,7 +121,7 @@ class RobotModel(Protocol):
         """
 
     def inverse(self, X: ArrayLike, within_limits: bool = True) -> Array:
-        """Every joint solution of one pose, (m, n); m is 0 where none exists."""
+        """Every joint solution of one pose, (m, n), some where there's no end of them; m is 0 where none exists."""
 
     def inverse_near(self, X: ArrayLike, q: ArrayLike, configuration: str | None = None) -> Array:
         """The solution within limits nearest to q, (n,), of the asked configuration, else of q's own first.
@@ -135,7 +135,8 @@ class RobotModel(Protocol):
 
         They keep q's configuration, or that which is asked for, and no joint jumps; position limits aren't
         considered. (k, n), NaN from the first pose on that isn't reached. At a pose that leaves joints free,
-        they may be anything.
+        they may be anything. Those of an arm of more than six joints depend on the pose and q alone, not on the
+        poses between; its q may be (2, n), the second row joint values to arrive at.
         """
 
     def configuration(self, q: ArrayLike) -> str:

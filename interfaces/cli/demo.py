@@ -38,8 +38,8 @@ DEFAULT_SEED = 6
 def demo(
     commands: Annotated[Path | None, option("FILE", "Plan file, JSON lines; the demo's own without it.")] = None,
     name: RobotName = USUAL,
-    body: BodyName = "",
     tip: Tip = "",
+    body: BodyName = "",
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",

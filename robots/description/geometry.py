@@ -9,7 +9,7 @@ from __future__ import annotations
 import atexit
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Final
 
 import numpy as np
 
@@ -17,6 +17,12 @@ from robots.description.description import Description, Joint, JointKind
 from robots.description.rigid import at_rest
 from vrs.errors import InvalidValueError
 from vrs.model import Array, frozen_array
+
+_STEPS: Final = 30
+_CLOSE: Final = 1e-12
+"""Half of the squared error at which the Toolbox's solver ends [m², rad²]."""
+_DAMPING: Final = 0.1
+"""As a share of half of the squared error that's left."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,17 +140,65 @@ def _named(description: Description, name: str) -> Joint:
     return found
 
 
-@lru_cache(maxsize=16)
-def compiled(chain: Geometry) -> Any:
-    """The same joints as the Robotics Toolbox's elementary transforms, whose kinematics are compiled."""
-    import roboticstoolbox as rtb
+class Compiled:
+    """The same joints as the Robotics Toolbox's elementary transforms, by its compiled functions."""
 
-    X, parts = np.eye(4), []
-    for before, axis, slides in zip(chain.X, chain.axes, chain.slides, strict=True):
-        align = _aligned(axis)
-        parts += [rtb.ET.SE3(X @ before @ align), rtb.ET.tz() if slides else rtb.ET.Rz()]
-        X = align.T
-    return rtb.ETS([*parts, rtb.ET.SE3(X @ chain.tip)])
+    def __init__(self, chain: Geometry) -> None:
+        """Compile them."""
+        import roboticstoolbox as rtb
+        from roboticstoolbox.ets import fknm
+
+        X, parts = np.eye(4), []
+        for before, axis, slides in zip(chain.X, chain.axes, chain.slides, strict=True):
+            align = _aligned(axis)
+            parts += [rtb.ET.SE3(X @ before @ align), rtb.ET.tz() if slides else rtb.ET.Rz()]
+            X = align.T
+        self._library = fknm
+        self._whole = rtb.ETS([*parts, rtb.ET.SE3(X @ chain.tip)])
+        self._ets = self._whole._fknm
+        self._gains = chain.gains if chain.follows else None
+        self._offsets = chain.offsets
+
+    def forward(self, q: Array) -> Array:
+        """Return the pose of the tip, (4, 4), at q, (n,)."""
+        return np.asarray(self._library.ETS_fkine(self._ets, self._values(q), None, None, 1))
+
+    def jacobian(self, q: Array) -> Array:
+        """Return its geometric Jacobian, (6, n)."""
+        J: Array = self._library.ETS_jacob0(self._ets, self._values(q), None)
+        return J if self._gains is None else J @ self._gains
+
+    def curvature(self, q: Array, weights: Array) -> Array:
+        """Return the derivative of the Jacobian's rows, weighted by (6,) and summed, (n, n), made symmetric."""
+        bend: Array = weights @ self._library.ETS_hessian0(self._ets, self._values(q), None, None)
+        if self._gains is not None:
+            bend = self._gains.T @ bend @ self._gains
+        return 0.5 * (bend + bend.T)
+
+    def solve(self, X: Array, start: Array, mask: Array) -> Array | None:
+        """Return joint values of a pose, (n,), by Levenberg-Marquardt's method, or None; not where joints follow.
+
+        Args:
+            X: The pose, (4, 4).
+            start: Joint values to start from, (n,).
+            mask: What each row of a pose counts, (6,).
+        """
+        q, found, *_ = self._library.IK_LM_c(
+            self._ets, X, np.array(start), _STEPS, 1, _CLOSE, False, mask, _DAMPING, "chan"
+        )
+        return np.asarray(q) if found else None
+
+    def _values(self, q: Array) -> Array:
+        """Values of all joints, (N,), writeable, as the library asks."""
+        if self._gains is not None:
+            return np.asarray(self._gains @ q + self._offsets)
+        return q if q.flags.writeable else q.copy()
+
+
+@lru_cache(maxsize=16)
+def compiled(chain: Geometry) -> Compiled:
+    """Return compiled joints; it takes a second to load the Toolbox."""
+    return Compiled(chain)
 
 
 # The compiled library reports what lives on when the interpreter ends.

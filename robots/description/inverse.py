@@ -33,6 +33,8 @@ _SAMPLES: Final = 512
 """Joint values whose poses are known, to start from the nearest of them."""
 _SETTLED: Final = 1e-7
 """Step [rad] after which Newton's next one is below rounding."""
+_ROUGHLY: Final = 2e-2
+"""The same where a redundant arm's joints needn't be the very nearest."""
 _STEPS: Final = 20
 _LONGEST: Final = 0.5
 """Longest step [rad, lengths]."""
@@ -48,14 +50,16 @@ _ALIKE: Final = 1e-6
 """Difference of joint values under which two solutions are one."""
 _LITTLE: Final = 1e-3
 """What nearness to given joints counts beside an orientation that can't be reached."""
-_CHAN: Final = 0.1
-"""Damping, as a share of the squared error that's left."""
 _CORRECTIONS: Final = 4
 _EXACT: Final = 1e-11
 _ENOUGH: Final = 4
 """Solutions of a position among which the nearest orientation is taken."""
 _HELD: Final = 8
 """Solutions beyond the limits that a redundant arm tries to bring back."""
+_LOOKS: Final = 16
+"""Joint values at which it's looked how many of a pose's rows they can change."""
+_LESS: Final = 0.1
+"""What a turn counts beside a way where orientations aren't reached."""
 _MASKS: Final = {TASK: np.ones(TASK), 3: np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])}
 """Rows of a pose that count, by their number."""
 
@@ -75,18 +79,23 @@ class Inverse:
         self._chain, self._limits, self._prismatic, self._length = chain, limits, prismatic, length
         n = self._n = limits.dof
         self._unit = units(prismatic, n, length)
+        self._weight = 1.0 / self._unit**2
         self._ranges = limits.q_min.tolist(), limits.q_max.tolist()
         self._turns = [0.0 if j in prismatic else tau for j in range(n)]
         rng = np.random.default_rng(0)
         self._samples = rng.uniform(limits.q_min, limits.q_max, (_SAMPLES, n))
         self._poses = chain.frames(self._samples)[:, -1]
-        J = chain.jacobian(self._samples[:16])
+        J = chain.jacobian(self._samples[:_LOOKS])
         J[:, :3] /= length
         J *= self._unit
         self.rank, self.position = (int(np.linalg.matrix_rank(part, rtol=1e-6).max()) for part in (J, J[:, :3]))
         self._full = self.rank == TASK
         self._rows = TASK if self._full else 3
         self._redundant = n > self.rank
+        # Squares of distances to a pose, but for what's the same for all: from the way, and from the turn.
+        p, R = self._poses[:, :3, 3], self._poses[:, :3, :3].reshape(-1, 9)
+        self._away = (p * p).sum(1) / length**2
+        self._towards = np.concatenate([-2.0 * p / length**2, -R if self._full else -_LESS * R], axis=1)
 
     def near(self, X: Array, q: Array) -> Array:
         """Return joint values of a pose within the limits, (n,), the nearest to q, (n,), that are found.
@@ -171,7 +180,7 @@ class Inverse:
         if goal is not None and self._redundant:
             share = self._shares(X, q, goal)[:, None]
             wanted = wanted + share * (stretched(goal, self._limits) - stretched(q, self._limits))
-        last, before = q, self.forward(q)
+        last, before = q, compiled(self._chain).forward(q)
         mark = stretched(q, self._limits)
         for k, pose in enumerate(X):
             there = self._onward(before, pose, last, mark, wanted[k], _HALVINGS)
@@ -180,49 +189,36 @@ class Inverse:
             found[k], last, before, mark = there, there, pose, wanted[k]
         return found
 
-    def forward(self, q: Array) -> Array:
-        """Return the pose of the tip, (4, 4), at q, (n,)."""
-        return np.asarray(compiled(self._chain).eval(self._values(q)))
-
-    def _values(self, q: Array) -> Array:
-        """Values of all joints, (N,)."""
-        return self._chain.gains @ q + self._chain.offsets if self._chain.follows else q
-
     def _starts(self, X: Array, q: Array) -> Iterator[Array]:
         """Yield joint values to start from: q, then those whose poses are known, the nearest first."""
         yield q
-        away = ((self._poses[:, :3, 3] - X[:3, 3]) ** 2).sum(1) / self._length**2
-        turn = 3.0 - (self._poses[:, :3, :3] * X[:3, :3]).sum((1, 2))
-        order = np.argsort(away + turn if self._full else away + 0.1 * turn, kind="stable")
-        yield from self._samples[order[: STARTS - 1]]
+        away = self._away + self._towards @ np.concatenate([X[:3, 3], X[:3, :3].ravel()])
+        first = int(away.argmin())
+        yield self._samples[first]
+        for k in np.argsort(away, kind="stable")[:STARTS]:
+            if k != first:
+                yield self._samples[k]
 
     def _guess(self, X: Array, start: Array, q: Array, rows: int = TASK) -> Array | None:
         """Joint values of a pose, or of its position alone, found from a start, on the turns nearest to q."""
         if self._chain.follows:
             there = self.settled(X, start, stretched(start, self._limits), rough=_STEPS)
         else:
-            found = compiled(self._chain).ik_LM(
-                X, q0=np.array(start), ilimit=30, slimit=1, tol=1e-12, mask=_MASKS[rows], joint_limits=False,
-                k=_CHAN,
-            )  # fmt: skip
-            there = np.asarray(found.q, dtype=np.float64) if found.success else None
+            there = compiled(self._chain).solve(X, start, _MASKS[rows])
             if there is not None and self._full:
                 there = self._corrected(X, there)
         return None if there is None else self._turned_to(there, q)
 
     def _corrected(self, X: Array, q: Array) -> Array | None:
         """The joint values of a pose next to some that are all but that."""
-        ets, p, RT = compiled(self._chain), X[:3, 3], X[:3, :3].T
+        chain, p, RT = compiled(self._chain), X[:3, 3], X[:3, :3].T
         for _ in range(_CORRECTIONS):
-            v = self._values(q)
-            T = ets.eval(v)
+            T = chain.forward(q)
             x, y, z = (T[:3, 3] - p).tolist()
             c = (x, y, z, *_sine(T[:3, :3] @ RT))
             if max(map(abs, c)) < _EXACT:
                 return q
-            J, miss = ets.jacob0(v), np.array(c)
-            if self._chain.follows:
-                J = J @ self._chain.gains
+            J, miss = chain.jacobian(q), np.array(c)
             if self._n == TASK:
                 q = q - _linear(J, miss)
             elif self._n > TASK:
@@ -256,7 +252,10 @@ class Inverse:
             return None
         if not self._redundant or float(stiffness(q, self._limits).max()) < stiff:
             return q
-        there = self.settled(X, q, stretched(near, self._limits), rough=_ROUGH)
+        there = self.settled(
+            X, q, stretched(near, self._limits), rough=_ROUGH if stiff > _STIFF else 1, within=_ROUGHLY
+        )
+        there = None if there is None else self._corrected(X, there)
         return q if there is None or self._violated(there) else there
 
     def _inside(self, X: Array, q: Array, near: Array) -> Array | None:
@@ -278,7 +277,14 @@ class Inverse:
         return None
 
     def settled(
-        self, X: Array, q: Array, wanted: Array, *, rough: int = 0, free: Array | None = None
+        self,
+        X: Array,
+        q: Array,
+        wanted: Array,
+        *,
+        rough: int = 0,
+        free: Array | None = None,
+        within: float = _SETTLED,
     ) -> Array | None:
         """Return joint values of a pose, by Newton's method from values near them, or None.
 
@@ -288,8 +294,9 @@ class Inverse:
             wanted: What a redundant arm's are to be near to, on the scale of `stretched`, (n,).
             rough: For how many steps curvature is left out.
             free: Which joints may move, (n,); all unless given.
+            within: Step after which it's good enough [rad, lengths].
         """
-        ets, rows, limits, chain = compiled(self._chain), self._rows, self._limits, self._chain
+        chain, rows = compiled(self._chain), self._rows
         n = self._n if free is None else int(free.sum())
         curves = not self._full or n > TASK
         p, RT = X[:3, 3], X[:3, :3].T
@@ -297,25 +304,17 @@ class Inverse:
         right = np.empty(n + rows)
         pull = np.zeros(TASK)
         for k in range(_STEPS):
-            v = self._values(q)
-            T, J = ets.eval(v), ets.jacob0(v)
+            T, J = chain.forward(q), chain.jacobian(q)
             M = T[:3, :3] @ RT
-            c = np.array([*(T[:3, 3] - p), *_sine(M)])
-            exact = k >= rough
-            curved = ets.hessian0(J0=J) if exact and curves else None
-            if chain.follows:
-                J = J @ chain.gains
+            c = np.array((*(T[:3, 3] - p).tolist(), *_sine(M)))
             if not curves:
                 step = _linear(J if free is None else J[:, free], -c)
             else:
                 if not self._full:
                     pull[3:] = c[3:]
-                H, slope = self._objective(q, J, M, c, wanted, limits, exact=exact)
-                if curved is not None:
-                    bend = pull @ curved
-                    if chain.follows:
-                        bend = chain.gains.T @ bend @ chain.gains
-                    H = H + 0.5 * (bend + bend.T)
+                H, slope = self._objective(q, J, M, c, wanted, exact=k >= rough)
+                if k >= rough:
+                    H += chain.curvature(q, pull)
                 A = J[:rows]
                 if free is not None:
                     H, slope, A = H[np.ix_(free, free)], slope[free], A[:, free]
@@ -334,16 +333,16 @@ class Inverse:
                 step = step * (_LONGEST / size)
                 pull[:] = 0.0
             q = q + step
-            if size < _SETTLED:
-                return q if self._kept(X, q) else None
+            if size < within:
+                return q if within > _SETTLED or self._kept(X, q) else None
         return None
 
     def _objective(
-        self, q: Array, J: Array, M: Array, c: Array, wanted: Array, limits: Limits, *, exact: bool
+        self, q: Array, J: Array, M: Array, c: Array, wanted: Array, *, exact: bool
     ) -> tuple[Array, Array]:
         """Hessian, (n, n), and gradient, (n,), of what is least: distance from what is wanted, or the turn."""
-        weight = 1.0 / self._unit**2
-        H, slope = np.diag(weight * stiffness(q, limits)), weight * (stretched(q, limits) - wanted)
+        H = np.diag(self._weight * stiffness(q, self._limits))
+        slope = self._weight * (stretched(q, self._limits) - wanted)
         if self._full:
             return H, slope
         w = J[3:]
@@ -357,14 +356,14 @@ class Inverse:
 
     def _kept(self, X: Array, q: Array) -> bool:
         """Whether the rows that bind are within `RESIDUAL` of a pose."""
-        T = self.forward(q)
+        T = compiled(self._chain).forward(q)
         if not float(np.abs(T[:3, 3] - X[:3, 3]).max()) <= RESIDUAL:
             return False
         return not self._full or float(np.abs(T[:3, :3] - X[:3, :3]).max()) <= RESIDUAL
 
     def _miss(self, X: Array, q: Array) -> float:
         """By which angle the tip's orientation misses a pose's [rad]."""
-        r = rotation_vector(self.forward(q)[:3, :3] @ X[:3, :3].T)
+        r = rotation_vector(compiled(self._chain).forward(q)[:3, :3] @ X[:3, :3].T)
         return float(np.sqrt(r @ r))
 
     def _onward(self, before: Array, X: Array, q: Array, mark: Array, wanted: Array, halvings: int) -> Array | None:
@@ -380,14 +379,14 @@ class Inverse:
 
     def _shares(self, X: Array, q: Array, goal: Array) -> Array:
         """How far along the straight way between the poses of two joint values others are, (k,)."""
-        end = self.forward(goal)
+        end = compiled(self._chain).forward(goal)
 
         def away(pose: Array) -> Array:
             return np.concatenate(
                 [(pose[:3, 3] - end[:3, 3]) / self._length, rotation_vector(pose[:3, :3] @ end[:3, :3].T)]
             )
 
-        way = away(self.forward(q))
+        way = away(compiled(self._chain).forward(q))
         size = float(way @ way)
         return np.array([1.0 - float(away(pose) @ way) / size if size else 1.0 for pose in X])
 

@@ -41,6 +41,7 @@ from vrs.planning.path import (
     turning,
 )
 from vrs.planning.plan import Plan, empty, end_state
+from vrs.planning.redundancy import TASK
 from vrs.segment import State
 
 _TIMES: Final = (0.3, 0.5, 0.75, 1.0, 1.4, 2.0, 3.0)
@@ -446,12 +447,23 @@ def _traced(course: Course, q: Array, task: _Task, hardness: float, *, free: boo
             halvings=12 - pieces // 2,
             free=free,
             tolerance=tolerance,
+            q_goal=task.q_goal,
         )
     except UnresolvedError:
         if hardness <= SINGULAR:
             raise
     graded = Course(course.start, course.corner, course.goal, power=2)
-    return trace(graded, q, task.model, task.configuration, pieces=4, halvings=24, free=free, tolerance=tolerance)
+    return trace(
+        graded,
+        q,
+        task.model,
+        task.configuration,
+        pieces=4,
+        halvings=24,
+        free=free,
+        tolerance=tolerance,
+        q_goal=task.q_goal,
+    )
 
 
 def _check(path: Path, samples: Samples, task: _Task) -> None:
@@ -486,7 +498,8 @@ def _snapped(q: Array, model: RobotModel) -> Array:
         J = bare(model).jacobian(trials)
         J[:, :3] /= model.characteristic_length
         U, _, Vt = np.linalg.svd(J[0])
-        least = np.einsum("i,kij,j->k", U[:, len(q) - 1], J, Vt[-1])
+        last = min(J.shape[1:]) - 1
+        least = np.einsum("i,kij,j->k", U[:, last], J, Vt[last])
         slope = (least[1 : len(q) + 1] - least[len(q) + 1 :]) / (2.0 * step)
         if abs(least[0]) < 1e-14 or slope @ slope < 1e-6:
             break
@@ -513,9 +526,12 @@ def _turn_note(q: Array, begin: Array) -> Note:
 
 
 def _blended(state: State, task: _Task) -> tuple[Plan, Notes] | None:
-    """A blend onto the line and the line; None where none is found that keeps the limits."""
+    """A blend onto the line and the line; None where none is found that keeps the limits.
+
+    A redundant arm has none: what its joints do beside moving the tool would have to end first.
+    """
     model, limits = task.model, task.limits
-    if not float(condition(model, state.q[None])[0]) < SINGULAR:
+    if limits.dof > TASK or not float(condition(model, state.q[None])[0]) < SINGULAR:
         return None
     smooth = task.profile is Profile.JERK_LIMITED
     tried = 0

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from vrs.errors import PlanningError, UnresolvedError
 from vrs.model import Array, Limits, RobotModel, frozen_array
+from vrs.planning.redundancy import TASK
 
 
 def rotation_vector(R: Array) -> Array:
@@ -365,6 +366,7 @@ def trace(
     halvings: int,
     free: bool,
     tolerance: float,
+    q_goal: Array | None = None,
 ) -> Path:
     """Follow a course with the joints.
 
@@ -377,6 +379,7 @@ def trace(
         halvings: How often a piece may be halved.
         free: Whether the pose at the beginning leaves joints free: they're then what the path needs.
         tolerance: At which a series has converged [rad].
+        q_goal: Joint values that a redundant arm is to arrive at, (n,) [rad]; None leaves them to the arm.
 
     Raises:
         UnresolvedError: If the joints aren't smooth.
@@ -385,7 +388,8 @@ def trace(
     marks = course.edges
     edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(marks)] + [marks[-1:]])
     low, high = edges[:-1], edges[1:]
-    known, near = q[None], q
+    redundant = len(q) > TASK
+    known, near = q[None], np.stack([q, q_goal]) if redundant and q_goal is not None else q
     done: list[tuple[Array, Array]] = []
     for level in range(halvings + 1):
         m = len(low)
@@ -409,7 +413,9 @@ def trace(
         middle = 0.5 * (low + high)[bad]
         quarters = _polynomials(np.array([-0.5, 0.5])) @ c[bad]
         known = quarters.reshape(-1, values.shape[2])
-        near = values[bad][0, ORDER // 2]
+        if not redundant:
+            # A redundant arm's joints are those nearest to where it began.
+            near = values[bad][0, ORDER // 2]
         low, high = np.stack([low[bad], middle], 1).ravel(), np.stack([middle, high[bad]], 1).ravel()
     else:
         raise UnresolvedError(stuck(model, known[0]), course.place(float(low[0])))
@@ -436,7 +442,7 @@ def _beyond(
     i = int(np.argmax(lost))
     beyond = float(s[order][i])
     inside = float(s[order][i - 1]) if i else beyond
-    at = found[order][i - 1] if i else near
+    at = found[order][i - 1] if i else near if near.ndim == 1 else near[0]
     for _ in range(40):
         middle = 0.5 * (inside + beyond)
         q = model.follow(course.poses(np.array([middle])), at, configuration)[0]
@@ -453,5 +459,5 @@ def _beyond(
 def stuck(model: RobotModel, q: Array) -> int:
     """Return the joint, from 0, that the singularity at or near q, (n,), makes turn fast; of several the first."""
     J = bare(model).jacobian(q) / np.repeat([model.characteristic_length, 1.0], 3)[:, None]
-    turning_fast = np.abs(np.linalg.svd(J)[2][-1])
+    turning_fast = np.abs(np.linalg.svd(J)[2][min(J.shape) - 1])
     return int(np.argmax(turning_fast > 0.7 * turning_fast.max()))

@@ -20,7 +20,7 @@ from vrs.model import Array, Limits
 TASK: Final = 6
 """Rows of a pose: three of position, three of orientation."""
 _STEEP: Final = 10.0
-_POWER: Final = 8
+"""What the ninth power of the share counts beside the share itself."""
 
 
 def stretched(q: Array, limits: Limits) -> Array:
@@ -28,16 +28,24 @@ def stretched(q: Array, limits: Limits) -> Array:
 
     It's the integral of `stiffness`.
     """
-    middle, half = 0.5 * (limits.q_min + limits.q_max), 0.5 * (limits.q_max - limits.q_min)
-    x = (q - middle) / half
-    return np.asarray(half * (x + _STEEP * x ** (_POWER + 1)))
+    x, half = _shares(q, limits)
+    y = x * x
+    y *= y
+    return np.asarray(half * (x + _STEEP * (y * y * x)))
 
 
 def stiffness(q: Array, limits: Limits) -> Array:
     """How much dearer a joint's motion is where it is than amid its range, (n,) or (k, n): 1 to 91 at a limit."""
-    middle, half = 0.5 * (limits.q_min + limits.q_max), 0.5 * (limits.q_max - limits.q_min)
-    x = (q - middle) / half
-    return np.asarray(1.0 + _STEEP * (_POWER + 1) * x**_POWER)
+    x, _ = _shares(q, limits)
+    y = x * x
+    y *= y
+    return np.asarray(1.0 + 9.0 * _STEEP * (y * y))
+
+
+def _shares(q: Array, limits: Limits) -> tuple[Array, Array]:
+    """Where joints are, from -1 at the lower limit to 1 at the upper one, and half of their ranges."""
+    half = 0.5 * (limits.q_max - limits.q_min)
+    return (q - limits.q_min) / half - 1.0, half
 
 
 def units(prismatic: Collection[int], n: int, length: float) -> Array:

@@ -31,6 +31,7 @@ from vrs.planning.certificate import violation
 from vrs.planning.online import roots
 from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, empty, packed
+from vrs.planning.redundancy import TASK, stiffness, units
 from vrs.segment import State
 
 JerkProfile: TypeAlias = list[tuple[float, float, float]]
@@ -392,7 +393,7 @@ def damped_rates(J: Array, twists: Array) -> tuple[Array, Array]:
     """
     U, S, Vt = np.linalg.svd(J, full_matrices=False)
     floor = S[:, :1] / STOP_AT
-    answer = 1.0 / np.maximum(S, floor)
+    answer = 1.0 / np.maximum(np.maximum(S, floor), 1e-300)
     answer *= np.minimum(S / np.maximum(floor, 1e-300), 1.0)
     parts = answer * (twists[:, None] @ U)[:, 0]
     u = (parts[:, None] @ Vt)[:, 0]
@@ -400,6 +401,52 @@ def damped_rates(J: Array, twists: Array) -> tuple[Array, Array]:
     if J.shape[1] == J.shape[2]:
         nearness = nearness * np.where(np.linalg.det(J) < 0.0, -1.0, 1.0)
     return u, nearness
+
+
+def position_first(J: Array, twists: Array) -> tuple[Array, Array]:
+    """Rates of arms of fewer than six joints: the position goes as asked, and the tool turns as that admits.
+
+    Args:
+        J: Jacobians, (k, 6, n).
+        twists: (k, 6).
+
+    Returns:
+        Rates [rad/s], (k, n), damped as by `damped_rates`, and σ_min / σ_max of the linear rows, (k,).
+    """
+    linear, angular = J[:, :3], J[:, 3:]
+    U, S, Vt = np.linalg.svd(linear)
+    m = S.shape[1]
+    floor = np.maximum(S[:, :1] / STOP_AT, 1e-300)
+    share = np.minimum(S / floor, 1.0)
+    parts = share / np.maximum(S, floor) * (twists[:, None, :3] @ U)[:, 0, :m]
+    u = (parts[:, None] @ Vt[:, :m])[:, 0]
+    left = np.ones(Vt.shape[:2])
+    left[:, :m] -= share * share
+    free = left[:, :, None] * Vt
+    turn = twists[:, 3:] - (angular @ u[:, :, None])[:, :, 0]
+    beside, _ = damped_rates(angular @ free.swapaxes(1, 2), turn)
+    return u + (beside[:, None] @ free)[:, 0], S[:, -1] / np.maximum(S[:, 0], 1e-300)
+
+
+def eased_rates(model: RobotModel, q: Array, J: Array, twists: Array) -> tuple[Array, Array]:
+    """Rates that give twists, as an arm of any number of joints takes them; they're damped as by `damped_rates`.
+
+    Those of a redundant arm are the least by the weights of `stiffness`: joints near their limits move less.
+
+    Args:
+        model: The arm.
+        q: Joint positions, (k, n).
+        J: Jacobians there, (k, 6, n).
+        twists: (k, 6).
+    """
+    n = J.shape[2]
+    if n < TASK:
+        return position_first(J, twists)
+    if n == TASK:
+        return damped_rates(J, twists)
+    unit = units(model.prismatic, n, model.characteristic_length)
+    ease = unit / np.sqrt(stiffness(q, model.limits))
+    return ease * damped_rates(J * ease[:, None], twists)[0], _nearness(J)
 
 
 def sliding_rates(J: Array, twist: Array, low: Array, high: Array) -> Array:
@@ -416,9 +463,10 @@ def sliding_rates(J: Array, twist: Array, low: Array, high: Array) -> Array:
     n = J.shape[1]
     u = np.zeros(n)
     free = np.ones(n, dtype=bool)
+    solve = position_first if n < TASK else damped_rates
     while free.any():
         left = twist - J[:, ~free] @ u[~free]
-        u[free] = damped_rates(J[None, :, free], left[None])[0][0]
+        u[free] = solve(J[None, :, free], left[None])[0][0]
         over = np.where(free, np.maximum(u - high, low - u), -np.inf)
         worst = int(np.argmax(over))
         if over[worst] <= 0.0:
@@ -472,17 +520,18 @@ def course(
     for _ in range(3):
         ways = seen * _NODES
         places = q + aside + ways[:, None] * u
-        rates, near = damped_rates(weighted_jacobian(model, places), twist.after(ways))
+        rates, near = eased_rates(model, places, weighted_jacobian(model, places), twist.after(ways))
+        if len(q) != TASK:
+            # The rates of a redundant arm bend so much that it shows in where they lead.
+            places = q + aside + _led(rates, ways)
+            rates, near = eased_rates(model, places, weighted_jacobian(model, places), twist.after(ways))
         # Rates near a singularity change like 1 / σ_min: no parabola fits them over a longer way.
         change_here = float(np.abs(near[1:] - near[0]).max()) / max(abs(float(near[0])), 1.0 / STOP_AT)
         if change_here <= 0.6 or seen <= _SHORTEST:
             break
         seen = max(0.5 * seen / change_here, _SHORTEST)
     offset = rates[0] - u
-    # The parabola through the three.
-    before, after = (rates[1] - rates[0]) / ways[1], (rates[2] - rates[1]) / (ways[2] - ways[1])
-    curve = 2.0 * (after - before) / seen
-    slope = before - 0.5 * curve * ways[1]
+    slope, curve = _parabola(rates, ways, seen)
     fastest = _SPEED / (np.abs(rates) / limits.qd_max).max(axis=1)
     grid = reach * _FINE
     caps = FREE
@@ -496,6 +545,23 @@ def course(
         ahead += np.maximum(grid - seen, 0.0) * float(near[2] - near[1]) / float(ways[2] - ways[1])
         caps = np.minimum(caps, _share(ahead, grid, sqrt(float(u @ u))))
     return TwistCourse(u, slope, curve, offset, seen, grid, caps)
+
+
+def _parabola(rates: Array, ways: Array, seen: float) -> tuple[Array, Array]:
+    """First and second derivative, at the first of three ways, of the parabola through rates, (3, n).
+
+    `seen` is how long the way is that they're for [s].
+    """
+    before, after = (rates[1] - rates[0]) / ways[1], (rates[2] - rates[1]) / (ways[2] - ways[1])
+    curve = 2.0 * (after - before) / seen
+    return before - 0.5 * curve * ways[1], curve
+
+
+def _led(rates: Array, ways: Array) -> Array:
+    """Where rates, (3, n), lead on three ways, (3, n)."""
+    slope, curve = _parabola(rates, ways, float(ways[2]))
+    s = ways[:, None]
+    return np.asarray(s * (rates[0] + s * (slope / 2.0 + s * curve / 6.0)))
 
 
 def _share(near: Array, way: Array, rate: float) -> Array:
@@ -829,10 +895,10 @@ def _by_twist(
 ) -> tuple[Plan, Notes, str]:
     J = weighted_jacobian(model, state.q[None])
     asked = np.concatenate([twist.linear, twist.angular])
-    u = damped_rates(J, asked[None])[0][0]
+    u = eased_rates(model, state.q[None], J, asked[None])[0][0]
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
         stuck = hold > 0.0 and bool(asked.any())
-        return *_released(state, J[0], hold, model, limits), _singular(state.q, model) if stuck else ""
+        return *_released(state, J[0], hold, model, limits), _stuck(state.q, model) if stuck else ""
     low, high = rates_to_limits(state.q, limits)
     blocked = bool((u < low).any() or (u > high).any())
     plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
@@ -865,6 +931,15 @@ def _nearness(J: Array) -> Array:
     """σ_min / σ_max of weighted Jacobians, (k,)."""
     S = np.linalg.svd(J, compute_uv=False)
     return np.asarray(S[:, -1] / np.maximum(S[:, 0], 1e-300))
+
+
+def _stuck(q: Array, model: RobotModel) -> str:
+    """Say why no joint moves at a twist."""
+    n = len(q)
+    if n < TASK:
+        which = "its only joint" if n == 1 else f"the arm's {n} joints"
+        return f"{which} can't move the tool that way: jog joints instead"
+    return _singular(q, model)
 
 
 def _singular(q: Array, model: RobotModel) -> str:

@@ -143,7 +143,7 @@ class Frames:
                 return self.model.inverse_near(X, near)
             asked = " ".join(_MODELS.get(word, word) for word in words)
             own = self.model.configuration(near).split()
-            kept = " ".join(word for word, pair in zip(own, _WORDS, strict=True) if not set(pair) & set(words))
+            kept = " ".join(word for word, pair in zip(own, _WORDS, strict=False) if not set(pair) & set(words))
             try:
                 return self.model.inverse_near(X, near, f"{asked} {kept}")
             except UnreachablePoseError:

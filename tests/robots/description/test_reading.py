@@ -257,10 +257,10 @@ def test_limits_of_moveit_count_and_toml_counts_more(tmp_path: Path) -> None:
     }
     (path.parent / "joint_limits.yaml").write_text(json.dumps(many))
     (path.parent / "my robot.toml").write_text(
-        'name = "mine"\n[joints.elbow]\nacceleration = 7\n[poses.nominal]\nslide = 0.3\n'
+        'name = "mine"\npoint = [0, 0, 0.1]\n[joints.elbow]\nacceleration = 7\n[poses.nominal]\nslide = 0.3\n'
     )
     found = described(str(path))
-    assert found.robot.name == "mine"
+    assert (found.robot.name, found.robot.tool) == ("mine", (0.0, 0.0, 0.1))
     assert found.robot.arm.limits.qd_max[1:3] == pytest.approx([1.5, 1.5])
     assert found.robot.arm.limits.qdd_max[1:3] == pytest.approx([4.0, 7.0])
     assert found.robot.arm.limits.qddd_max[2] == 30.0
