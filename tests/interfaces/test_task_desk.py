@@ -172,3 +172,19 @@ def test_a_route_is_drawn_as_a_path_through_its_points() -> None:
     assert drawn.end == pytest.approx(5.0 / ROUTE_SPEED, abs=0.01)
     for way, place in ((0.0, (0.0, 0.0)), (1.0, (1.0, 0.0)), (2.5, (2.0, 0.5)), (5.0, (0.0, 1.0))):
         assert drawn.sample(way / ROUTE_SPEED)[:2] == pytest.approx(place, abs=0.01)
+
+
+def test_a_goal_that_no_way_leads_to_is_refused_and_the_good_one_stays() -> None:
+    office = Office()
+    office.rig.begin()
+    good = Goal(2.5, 3.0)
+    assert office.order(RobotTask(go=good)) == ""
+    office.run(1.0)
+    assert office.tasks.goal == good
+    for bad in (Goal(0.0, 3.0), Goal(7.95, 5.95), Goal(-3.0, 2.0), Goal(99.0, 2.0)):
+        assert office.order(RobotTask(go=bad)) != ""
+        office.run(0.5)
+        assert (office.tasks.goal, office.tasks.doing) == (good, Doing.GOAL)
+    assert office.order(RobotTask(go=Goal(1.0, 2.0))) == ""
+    office.run(0.5)
+    assert office.tasks.goal == Goal(1.0, 2.0)

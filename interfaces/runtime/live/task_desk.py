@@ -37,7 +37,7 @@ from robots.bullet.rooms import Room
 from robots.mobile.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
-from robots.onboard.routes import RouteMap
+from robots.onboard.routes import NoRoute, RouteMap, RouteProblem
 from vrs.errors import FormatError
 
 LARGEST: Final = 24_000
@@ -113,12 +113,34 @@ class TaskDesk(OperatorDevice):
         return Plan((room.length, room.width), rings, room.via, robot)
 
     def order(self, task: RobotTask) -> str:
-        """Do what somebody wants; why not, empty if it's done."""
+        """Do what somebody wants; why not, empty if it's done.
+
+        A goal to which no way leads on the known map is refused, and what the robot does goes on.
+        """
+        if task.go is not None and (why := self._unreachable(task.go)):
+            return why
         if task.jobs is not None:
             return self._edit(task.jobs)
         if task.do is ListCommand.DRY_RUN:
             return self._try()
         return self._operator.robot.order(task) if task.do is None else self._command(task, task.do)
+
+    def _unreachable(self, goal: Goal) -> str:
+        """Why no way leads to a goal on the known map, from where the robot was measured; empty where one does."""
+        report = self._operator.report
+        if report is None:
+            return ""
+        x, y, _ = report.posture
+        found = self._known().route((x, y), (goal.x, goal.y))
+        # Where it stands and can't turn, it drives out first.
+        bad = isinstance(found, NoRoute) and found.problem is not RouteProblem.START
+        return found.reason if isinstance(found, NoRoute) and bad else ""
+
+    def _known(self) -> RouteMap:
+        """Ways on the known map."""
+        if self._roads is None:
+            self._roads = route_map(self._room, self._base.body)
+        return self._roads
 
     def _edit(self, jobs: JobList) -> str:
         """Take another list, and keep it."""
@@ -163,9 +185,7 @@ class TaskDesk(OperatorDevice):
             self.turn()
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
-        if self._roads is None:
-            self._roads = route_map(self._room, self._base.body)
-        return dry_run(jobs, posture, self._roads, self._base.limits, arm=self._arm)
+        return dry_run(jobs, posture, self._known(), self._base.limits, arm=self._arm)
 
     @property
     def _doing(self) -> Doing:
