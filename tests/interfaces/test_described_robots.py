@@ -133,6 +133,18 @@ def test_a_recording_says_when_its_file_is_gone_and_takes_another(
     assert "identical" in vrs("replay", out / "run.mcap", "--commands", "--robot", there, "--tip", "lamp")
 
 
+@pytest.mark.parametrize("body", ["bullet", "mujoco"])
+def test_its_physics_follows_in_either_world(robot: Path, tmp_path: Path, body: str) -> None:
+    (tmp_path / "plan.jsonl").write_text('{"issue": 0.0, "execute": 0.5, "move": [0.3, 40, -30, 60], "speed": 0.5}')
+    vrs(
+        "demo", "--robot", robot, "--body", body, "--commands", tmp_path / "plan.jsonl", "--delay", "none",
+        "--out", tmp_path,
+    )  # fmt: skip
+    servo = json.loads((tmp_path / "summary.json").read_text())["errors"]["servo"]
+    assert 0.0 < servo["tool_rms_m"] < 0.01
+    assert max(x for x in servo["joint_rms_deg"] if x is not None) < 0.5
+
+
 def test_bases_drive_in_the_laboratory_and_their_recordings_play(tmp_path: Path) -> None:
     vrs(
         "lab", "--robot", DIFF, "--robot", HUSKY, "--operator", "slalom", "--architecture", "timeline", "--runs", 1,

@@ -105,7 +105,8 @@ function Field({ jog, kind, k, field: { name, sign }, label, title, go }) {
 function Joints({ station, dof, go }) {
   const { jog } = station;
   const fields = jog.fields("joints").slice(0, dof);
-  const more = dof > 6 ? `, 1 to ${dof - 6}, Z to ${keyName(DOWN[dof - 1])}` : "";
+  const further = dof === 7 ? ", 1 and Z" : `, 1 to ${dof - 6}, Z to ${keyName(DOWN[dof - 1])}`;
+  const more = dof > 6 ? further : "";
   const last = Math.min(6, dof) - 1;
   return html`<section>
     <div class="head"><h2>Joints</h2>
