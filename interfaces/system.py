@@ -6,7 +6,6 @@ What only some systems have is asked for here alone, and done without where it i
 from __future__ import annotations
 
 import contextlib
-import importlib
 import inspect
 import os
 import secrets
@@ -17,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from robots.robot import module_of
 from vrs.errors import FormatError, InvalidValueError
 
 if TYPE_CHECKING:
@@ -155,14 +155,8 @@ def own(kind: str, text: str, given: tuple[str, ...]) -> Callable[..., Any]:
         FormatError: If the module can't be imported; whatever it raised is in the message.
         InvalidValueError: If it hasn't got that name, or it can't be called so.
     """
-    where, _, name = text.partition(":")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    # A stranger's module may raise anything.
-    try:
-        module = importlib.import_module(where)
-    except Exception as error:
-        raise FormatError(text, f"can't be imported as {kind}: {type(error).__name__}: {error}") from error
+    module, name = module_of(text, kind)
+    where = module.__name__
     made = getattr(module, name, None)
     if not callable(made):
         names = ", ".join(sorted(_callables(module.__dict__, where))) or "none"

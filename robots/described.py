@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.base import upright
-from robots.chain import Chain
 from robots.description.arm import arm_model
 from robots.description.assumptions import completed, lines_to_state
 from robots.description.beside import stated_file, stated_of
@@ -24,10 +23,10 @@ from robots.description.rigid import at_rest, motion, rigid_chain
 from robots.description.wheels import wheeled
 from robots.mobile import differential
 from robots.onboard.laser import LaserModel
-from robots.robot import IDEAL, NUMBERS, Appearance, Gripper, Robot, exact_arm
+from robots.robot import NUMBERS, Appearance, Gripper, Robot
 from robots.simulated import WORLDS, chain_arm
 from robots.solids import LinkShape
-from vrs.model import Array, Limits
+from vrs.model import Array
 
 TIP: Final = "#"
 """What stands between a file and the link at the end of the arm."""
@@ -101,24 +100,19 @@ def described(what: str) -> DescribedRobot:
         )
     whole = completed(description, tip)
     model = arm_model(whole, whole.tip)
-    chain, said = rigid_chain(whole, whole.tip)
     shapes = _arm_shapes(whole)
+    chain = rigid_chain(whole, whole.tip)
+    bodies = {world: partial(chain_arm, world, chain, model.limits) for world in WORLDS}
     robot = Robot(
         _called(whole, path),
         model,
         Appearance(lambda: shapes, model.links) if shapes else None,
-        arm_bodies(chain, model.limits),
+        bodies,
         () if whole.point is None else (Gripper(whole.point),),
         tuple(joint.name for joint in whole.chain(whole.tip) if joint.moves),
         f"{path}{TIP}{tip}" if tip else str(path),
     )
-    notes = (*whole.notes, *(f"{note[0].upper()}{note[1:]}." for note in said))
-    return DescribedRobot(robot, whole, notes, tuple(lines_to_state(description, whole)), file)
-
-
-def arm_bodies(chain: Chain, limits: Limits) -> Mapping[str, Callable[..., Any]]:
-    """What can be real of an arm, by name, the usual one first: `ideal`, as servos don't keep up with every arm."""
-    return {IDEAL: exact_arm, **{world: partial(chain_arm, world, chain, limits) for world in WORLDS}}
+    return DescribedRobot(robot, whole, whole.notes, tuple(lines_to_state(description, whole)), file)
 
 
 def split(what: str) -> tuple[str, str]:

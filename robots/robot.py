@@ -8,8 +8,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
@@ -50,6 +51,7 @@ FILES: Final = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
 NUMBERS: Final = "diff:"
 """What a mobile robot in numbers begins with."""
 _DESCRIBED: Final = "robots.described"
+_DRIVER: Final = "robots.driver"
 """What reads them; it stands after this module, and is loaded when it's needed."""
 
 
@@ -285,17 +287,26 @@ class Robot:
         """Name of a body that it has.
 
         Args:
-            name: One of `bodies`, of an arm also `ideal`, or `exact` for that; the usual one unless given.
+            name: One of `bodies`, of an arm also `ideal`, or `exact` for that; or `MODULE:NAME`, which makes a
+                driver of its hardware (`robots.driver`). The usual one unless given.
 
         Raises:
             InvalidValueError: If it has no such body.
         """
         asked = IDEAL if name == EXACT else name or self.usual_body
+        if is_driver(asked) and not self.is_base:
+            return asked
         ideal = () if self.is_base else (IDEAL,)
         return one_of(f"body of {self.name}", asked, dict.fromkeys((*self.bodies, *ideal)))
 
     def with_body(self, name: str) -> Self:
-        """The same robot, of which another body is the usual one; see `body_name`."""
+        """The same robot, of which another body is the usual one; see `body_name`.
+
+        Raises:
+            InvalidValueError: If it has no such body, or it's hardware, which follows no virtual time.
+        """
+        if is_driver(name):
+            raise InvalidValueError("body", name, "a simulated one: hardware runs live, in serve and robot")
         chosen = self.body_name(name)
         return replace(self, bodies={chosen: self.body(chosen), **self.bodies})
 
@@ -308,7 +319,39 @@ class Robot:
         Raises:
             InvalidValueError: If it has no such body.
         """
-        return {**self.bodies, IDEAL: exact_arm}[self.body_name(name)]
+        chosen = self.body_name(name)
+        if is_driver(chosen):
+            driver = importlib.import_module(_DRIVER)
+            return partial(driver.driver_arm, driver.load_driver(chosen))
+        return {**self.bodies, IDEAL: exact_arm}[chosen]
+
+
+def is_driver(body: str) -> bool:
+    """Whether a body's name is that of what makes a driver, `MODULE:NAME`."""
+    return ":" in body
+
+
+def module_of(what: str, kind: str) -> tuple[ModuleType, str]:
+    """Import the module of `MODULE:NAME`, which may lie in the working directory.
+
+    Args:
+        what: It.
+        kind: What it's to be, for the messages.
+
+    Returns:
+        The module, and the name.
+
+    Raises:
+        FormatError: If it can't be imported; whatever it raised is in the message.
+    """
+    where, _, name = what.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    # A stranger's module may raise anything.
+    try:
+        return importlib.import_module(where), name
+    except Exception as error:
+        raise FormatError(what, f"can't be imported as {kind}: {type(error).__name__}: {error}") from error
 
 
 def names() -> tuple[str, ...]:
@@ -337,18 +380,11 @@ def load(what: str) -> Robot:
     if reference is None:
         allowed = f"one of {', '.join(names())}, a file ({', '.join(FILES)}), diff:…, or MODULE:NAME of your own"
         raise InvalidValueError("robot", what, allowed, did_you_mean(what, names()))
-    where, _, name = reference.partition(":")
-    if own and os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    # A stranger's module may raise anything.
-    try:
-        module = importlib.import_module(where)
-    except Exception as error:
-        raise FormatError(what, f"can't be imported as a robot: {type(error).__name__}: {error}") from error
+    module, name = module_of(reference, "a robot")
     robot = getattr(module, name, None)
     if not isinstance(robot, Robot):
         there = ", ".join(sorted(key for key, value in vars(module).items() if isinstance(value, Robot))) or "none"
-        raise InvalidValueError(f"robot in {where}", name, f"a Robot there ({there})")
+        raise InvalidValueError(f"robot in {module.__name__}", name, f"a Robot there ({there})")
     return replace(robot, found_by=what)
 
 

@@ -19,10 +19,12 @@ from interfaces.cli.options import (
     left_out,
     option,
     program_files,
+    robot_of,
     val_robot,
 )
 from interfaces.cli.run import text_of
 from robots.robot import USUAL, described
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,15 +44,19 @@ SUFFERED = 2
 def check(
     ctx: typer.Context,
     programs: Annotated[
-        list[Path],
+        list[Path] | None,
         argument("PROGRAM.v2|ROBOT", "Files of VAL-II programs and values; or of robots: URDF, xacro, MJCF, TOML."),
-    ],
+    ] = None,
     program: Annotated[str, option("NAME", "Which program is planned; the first unless given.")] = "",
     static: Annotated[bool, option("--static", "Only read the programs; don't plan what one would do.")] = False,
     name: RobotName = USUAL,
     tip: Tip = "",
     dialect: DialectName = "",
     files: ProgramFiles = None,
+    driver: Annotated[
+        str, option("MODULE:NAME", "Instead: whether a driver of the robot's hardware does what one must.")
+    ] = "",
+    move: Annotated[bool, option("--move", "Let the driver move each joint a little.")] = False,
     as_json: Annotated[bool, option("--json", "Write the findings as JSON on standard output.")] = False,
 ) -> int:
     """Say what is wrong with programs: undefined names and labels, mixed types, places out of reach.
@@ -58,6 +64,12 @@ def check(
     Exits 2 when there's an error; warnings alone don't count. Of descriptions of robots: links, joints, limits, the
     tip, what is assumed and how it's stated.
     """
+    if driver:
+        from interfaces.cli.check_driver import check_driver
+
+        return 0 if check_driver(driver, robot_of(name, tip).arm.limits, move=move) else SUFFERED
+    if not programs:
+        raise InvalidValueError("what is checked", "nothing", "files, or --driver MODULE:NAME")
     if any(described(str(path)) for path in programs):
         from interfaces.cli.check_robot import check_robots
 

@@ -38,7 +38,8 @@ from interfaces.cli.options import (
     tokens_for,
 )
 from interfaces.system import run_loop, software
-from robots.robot import USUAL, USUAL_CLIENT, ThinClient, load
+from robots.driver import load_driver, standing
+from robots.robot import USUAL, USUAL_CLIENT, ThinClient, is_driver, load
 from vrs.checks import number_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.model import home
@@ -234,6 +235,8 @@ def robot(
 
         model = chosen.arm
         q = home(model) if pose == POSE else model.poses[one_of("pose", pose, sorted(model.poses))]
+        if is_driver(body):
+            q = standing(load_driver(body), model.limits)
         physics = PhysicsConfig(chosen, q, body, friction)
         number_in("lead", lead, 0.01, 0.3, unit=" s")
         site = RobotSiteConfig(fixed_offset=_offset(offset), beat=beat, watchdog=watchdog)

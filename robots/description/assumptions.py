@@ -19,6 +19,10 @@ TURN_SPEED, SLIDE_SPEED = 1.0, 0.1
 """Largest speeds where none are said [rad/s], [m/s]."""
 SPEED_TIME, ACCELERATION_TIME = 0.25, 0.1
 """In what time joints reach their largest speeds, and their largest accelerations, where nothing is said [s]."""
+ROTOR_TIME: Final = 0.02
+"""In what time a drive with nothing on it reaches its joint's largest speed, where its inertia isn't said [s]."""
+ROTOR_MOST: Final = (0.1, 10.0)
+"""Inertia of a drive that is assumed at most [kg m²], and of prismatic joints [kg]."""
 REACH_TIME: Final = 2.0
 """In what time a tool goes as far as the arm reaches, where its speed isn't said [s]."""
 FASTEST: Final = 1.0
@@ -88,6 +92,7 @@ def lines_to_state(before: Description, after: Description) -> list[str]:
 
 _KEYS: Final = {
     "lower": "q_min", "upper": "q_max", "velocity": "qd_max", "acceleration": "qdd_max", "jerk": "qddd_max",
+    "armature": "armature",
 }  # fmt: skip
 """What limits are called in TOML, and here."""
 
@@ -115,6 +120,9 @@ def _assumed(joint: Joint) -> Joint:
         qd_max=speed,
         qdd_max=acceleration,
         qddd_max=joint.qddd_max or acceleration / ACCELERATION_TIME,
+        armature=min(ROTOR_TIME * (joint.effort or 0.0) / speed, ROTOR_MOST[slides])
+        if joint.armature is None
+        else joint.armature,
     )
 
 
@@ -147,6 +155,12 @@ def _say_joints(joints: Sequence[Joint], notes: list[str]) -> None:
     say(
         lacking(lambda joint: not joint.qddd_max),
         f"no jerk is said; assumed such that the largest acceleration is reached in {ACCELERATION_TIME:g} s.",
+    )
+    say(lacking(lambda joint: not joint.effort), "no effort is said; the drive has no limit.")
+    say(
+        lacking(lambda joint: joint.armature is None),
+        f"no inertia of the drive (armature) is said; assumed such that it reaches the largest speed by itself in "
+        f"{1e3 * ROTOR_TIME:g} ms, at most {ROTOR_MOST[0]:g} kg m² or {ROTOR_MOST[1]:g} kg.",
     )
 
 

@@ -173,7 +173,7 @@ def _joint(joint: Joint, stated: StatedJoint | None, file: str) -> Joint:
         return joint
     given: dict[str, Any] = {
         "q_min": stated.lower, "q_max": stated.upper, "qd_max": stated.velocity, "qdd_max": stated.acceleration,
-        "qddd_max": stated.jerk, "effort": stated.effort,
+        "qddd_max": stated.jerk, "effort": stated.effort, "armature": stated.armature,
     }  # fmt: skip
     changed = replace(joint, **{name: value for name, value in given.items() if value is not None})
     if changed.q_min is not None and changed.q_max is not None and changed.q_min >= changed.q_max:

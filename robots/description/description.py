@@ -78,7 +78,7 @@ class Joint:
     """Viscous friction [N m s/rad], [N s/m]."""
     friction: float = 0.0
     """Coulomb friction [N m], [N]."""
-    armature: float = 0.0
+    armature: float | None = None
     """Inertia of the drive at the joint [kg m²], mass [kg]."""
     mimic: Mimic | None = None
 

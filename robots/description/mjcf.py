@@ -129,7 +129,7 @@ class _Compiled:
         return Joint(
             name, kind, parent, child, X, axis, q_min=low, q_max=high, effort=self._efforts.get(j),
             damping=float(np.ravel(m.dof_damping[dof])[0]), friction=float(m.dof_frictionloss[dof]),
-            armature=float(m.dof_armature[dof]),
+            armature=float(m.dof_armature[dof]) or None,
             mimic=self._mimics.get(j),
         )  # fmt: skip
 

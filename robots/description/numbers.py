@@ -59,6 +59,8 @@ class StatedJoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Largest jerk."""
     effort: Annotated[float, within(1e-4, 1e6, "N m")] | None = None
     """Largest torque or force."""
+    armature: Annotated[float, within(0.0, 1e4, "kg m²")] | None = None
+    """Inertia of the drive at the joint."""
 
 
 class Stated(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

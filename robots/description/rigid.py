@@ -1,9 +1,8 @@
-"""What a description's arm weighs: a chain of rigid links, and what was assumed for it."""
+"""What a description's arm weighs: a chain of rigid links."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -11,23 +10,18 @@ from robots.chain import Chain, ChainLink, Inertia, quaternion, together
 from robots.description.description import Description, Joint, JointKind
 from vrs.model import Array
 
-LEAST_MASS: Final = 0.1
-"""Mass of a moving link of which none is stated [kg], an assumption."""
-LEAST_SIZE: Final = 0.02
-"""Radius of the ball by whose inertia one is replaced that is less [m], an assumption."""
 
-
-def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, ...]]:
+def rigid_chain(description: Description, tip: str) -> Chain:
     """The links between the joints that lead to a tip.
 
     What hangs on other joints is fixed where they rest: at 0, or at the limit that is nearest to it.
 
     Args:
-        description: Of the robot.
+        description: Of the robot, nothing missing.
         tip: The link that holds loads.
 
     Returns:
-        The chain, a link a moving joint; and what was assumed, a sentence each.
+        A link a moving joint.
     """
     moving = {joint.name: k for k, joint in enumerate(j for j in description.chain(tip) if j.moves)}
     placed: dict[str, tuple[int, Array]] = {description.root: (-1, np.eye(4))}
@@ -44,34 +38,19 @@ def rigid_chain(description: Description, tip: str) -> tuple[Chain, tuple[str, .
         if owner >= 0:
             link = description.links[name]
             parts[owner].append(Inertia(link.mass, link.centre, link.inertia).moved(X))
-    notes: list[str] = []
-    links = tuple(_link(*joint, together(part), notes) for joint, part in zip(joints, parts, strict=True))
-    return Chain(links, placed[tip][1]), tuple(notes)
+    links = tuple(_link(joint, X, together(part)) for (joint, X), part in zip(joints, parts, strict=True))
+    return Chain(links, placed[tip][1])
 
 
-def _link(joint: Joint, X: Array, inertia: Inertia, notes: list[str]) -> ChainLink:
-    mass, centre, tensor = inertia
-    if mass <= 0.0:
-        mass = LEAST_MASS
-        notes.append(f"no link on joint {joint.name} has a mass: {LEAST_MASS:g} kg is assumed")
-    least = 0.4 * mass * LEAST_SIZE**2
-    if np.linalg.eigvalsh(tensor)[0] < 0.1 * least:
-        tensor = tensor + least * np.eye(3)
-        notes.append(
-            f"links on joint {joint.name} have no inertia about some axis: that of a ball of "
-            f"{100 * LEAST_SIZE:g} cm is added"
-        )
-    effort = joint.effort if joint.effort else math.inf
-    if effort == math.inf:
-        notes.append(f"joint {joint.name} states no effort: its drive has no limit")
+def _link(joint: Joint, X: Array, inertia: Inertia) -> ChainLink:
     return ChainLink(
         X[:3, 3],
         quaternion(X[:3, :3]),
-        Inertia(mass, centre, tensor),
+        inertia,
         axis=joint.axis,
         prismatic=joint.kind is JointKind.PRISMATIC,
-        effort=effort,
-        armature=joint.armature,
+        effort=joint.effort or math.inf,
+        armature=joint.armature or 0.0,
         viscous=joint.damping,
         coulomb=(joint.friction, -joint.friction),
     )

@@ -18,6 +18,7 @@ from interfaces.messages.control import Lease
 from interfaces.runtime.laboratory import Laboratory
 from interfaces.stream.connection import Connection
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
+from robots import puma560
 from tests.interfaces.live_rig import (
     HALT,
     MODEL,
@@ -231,3 +232,28 @@ def test_nothing_is_made_up_for_after_a_pause(who: str) -> None:
         assert (np.abs(stopped - before) <= np.abs(rates) * 1.5 + 1e-6).all()
         time.sleep(2.0)
         assert np.abs(np.array(robot.health()["q"]) - stopped).max() <= 1e-9
+
+
+@pytest.mark.parametrize("stuck", [False, True])
+def test_hardware_behind_a_driver_follows_and_is_stopped_where_a_servo_is_stuck(stuck: bool) -> None:
+    bus = f"tests.interfaces.servo_buses:{'Stuck' if stuck else 'Sound'}"
+    start = puma560.model().poses["nominal"]
+    with (
+        child("serve", "--port", "0", "--body", bus, "--link-loss", "hold") as server,
+        connect(server.url.replace("http", "ws").replace("/view", "/ws")) as robot,
+    ):
+        robot.acquire()
+        robot.wait(lambda r: r.state is not None and not r.state.halted and r.state.connected, 30.0)
+        assert robot.state is not None
+        assert np.abs(robot.state.q - start).max() < 0.01
+        receipt = robot.designer.issue(MotionCommand(JointTarget(start + 0.25), speed=0.3), wait=5.0).receipt
+        assert receipt is not None
+        assert receipt.end is not None
+        end = receipt.end
+        if stuck:
+            robot.wait(lambda r: r.state is not None and "from where it should be" in r.state.halted, 20.0)
+            assert "joint 2" in robot.state.halted
+        else:
+            robot.wait(lambda r: r.state is not None and r.state.play >= end + 0.5, 20.0)
+            assert not robot.state.halted
+            assert np.abs(robot.state.q - start - 0.25).max() < 0.02
