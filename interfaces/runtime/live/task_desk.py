@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+import numpy as np
 from msgspec.structs import replace
 from typing_extensions import override
 
@@ -21,7 +22,9 @@ from interfaces.messages.jobs import (
     Doing,
     Forecast,
     JobList,
+    JobStage,
     ListCommand,
+    MoveJob,
     OperatorLoss,
     Progress,
     RobotTask,
@@ -37,7 +40,7 @@ from robots.bullet.rooms import Room
 from robots.mobile.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
-from robots.onboard.routes import NoRoute, RouteMap, RouteProblem
+from robots.onboard.routes import NoRoute, RouteProblem
 from vrs.errors import FormatError
 
 LARGEST: Final = 24_000
@@ -87,7 +90,9 @@ class TaskDesk(OperatorDevice):
         self.progress = carried_over(jobs, progress, jobs, progress)
         self._digest = digest(jobs)
         self._forecast: Forecast | None = None
-        self._roads: RouteMap | None = None
+        self._roads = route_map(room, base.body)
+        # The first search works all ways out, 0.3 s: not while somebody drives.
+        self._roads.route(room.start[:2], room.start[:2])
         self._trying: asyncio.Task[None] | None = None
         self._report: TaskReport | None = None
         self._sight: SensedPoints | None = None
@@ -113,34 +118,39 @@ class TaskDesk(OperatorDevice):
         return Plan((room.length, room.width), rings, room.via, robot)
 
     def order(self, task: RobotTask) -> str:
-        """Do what somebody wants; why not, empty if it's done.
-
-        A goal to which no way leads on the known map is refused, and what the robot does goes on.
-        """
-        if task.go is not None and (why := self._unreachable(task.go)):
-            return why
+        """Do what somebody wants; why not, empty if it's done."""
         if task.jobs is not None:
             return self._edit(task.jobs)
         if task.do is ListCommand.DRY_RUN:
             return self._try()
-        return self._operator.robot.order(task) if task.do is None else self._command(task, task.do)
+        if task.do is not None:
+            return self._command(task, task.do)
+        refusal = "" if task.go is None else self._unreachable([("", task.go)])
+        return refusal or self._operator.robot.order(task)
 
-    def _unreachable(self, goal: Goal) -> str:
-        """Why no way leads to a goal on the known map, from where the robot was measured; empty where one does."""
+    def _unreachable(self, goals: Sequence[tuple[str, Goal]]) -> str:
+        """Why the known map has no way to goals, one after the other, from where the robot is; empty if it has.
+
+        Args:
+            goals: What each is called in front of the reason, and where it is.
+        """
         report = self._operator.report
         if report is None:
             return ""
-        x, y, _ = report.posture
-        found = self._known().route((x, y), (goal.x, goal.y))
-        # Where it stands and can't turn, it drives out first.
-        bad = isinstance(found, NoRoute) and found.problem is not RouteProblem.START
-        return found.reason if isinstance(found, NoRoute) and bad else ""
-
-    def _known(self) -> RouteMap:
-        """Ways on the known map."""
-        if self._roads is None:
-            self._roads = route_map(self._room, self._base.body)
-        return self._roads
+        roads, here = self._roads, (report.posture.x, report.posture.y)
+        for name, goal in goals:
+            there, (length, width) = (goal.x, goal.y), (self._room.length, self._room.width)
+            place = f"({goal.x:.2f}, {goal.y:.2f})"
+            if not (0 <= goal.x <= length and 0 <= goal.y <= width):
+                return f"{name}{place} is outside the map: x is 0 to {length:g} m, y 0 to {width:g} m"
+            if roads.knows(np.array([there]), 0.0)[0]:
+                return f"{name}{place} is inside a wall or a thing on the map"
+            found = roads.route(here, there)
+            # Where it can't turn now, the robot first drives to where it can.
+            if isinstance(found, NoRoute) and found.problem is not RouteProblem.START:
+                return name + found.reason
+            here = there
+        return ""
 
     def _edit(self, jobs: JobList) -> str:
         """Take another list, and keep it."""
@@ -157,12 +167,23 @@ class TaskDesk(OperatorDevice):
     def _command(self, task: RobotTask, command: ListCommand) -> str:
         """Let the robot do something with the list, which it's given if it hasn't it."""
         refusal = JobRunner.at(self.jobs, self.progress).receive(command, now=0.0)
+        if not refusal and command in (ListCommand.RUN, ListCommand.RESUME):
+            refusal = self._unreachable(self._moves(command))
         if refusal:
             return refusal
         has = self._report is not None and self._report.digest == self._digest
         if has:
             return self._operator.robot.order(task)
         return self._operator.robot.order(RobotTask(jobs=self.jobs, progress=self.progress), task)
+
+    def _moves(self, command: ListCommand) -> list[tuple[str, Goal]]:
+        """Goals of the moves that a command would begin, with the jobs' places in the list."""
+        done = {job.number for job in self.progress.jobs if job.stage is JobStage.DONE}
+        return [
+            (f"job {k}: ", self.jobs.goal(job))
+            for k, job in enumerate(self.jobs.jobs, 1)
+            if isinstance(job, MoveJob) and (command is ListCommand.RUN or job.number not in done)
+        ]
 
     def _try(self) -> str:
         """Begin a dry run of the list, from where the robot is."""
@@ -185,7 +206,7 @@ class TaskDesk(OperatorDevice):
             self.turn()
 
     def _forecast_of(self, jobs: JobList, posture: Posture) -> Forecast:
-        return dry_run(jobs, posture, self._known(), self._base.limits, arm=self._arm)
+        return dry_run(jobs, posture, self._roads, self._base.limits, arm=self._arm)
 
     @property
     def _doing(self) -> Doing:
