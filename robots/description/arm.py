@@ -22,7 +22,7 @@ _POSE: Final = "a homogeneous transform, (4, 4), its rotation orthonormal to 1e-
 _POSES: Final = "finite homogeneous transforms, shape (k, 4, 4)"
 _STANDING: Final = ("ready", "home")
 """Named poses that an arm stands in, where none is called `nominal`."""
-_TRIED, _BENT, _PLAIN = 256, 0.5, 1.0
+_TRIED, _BENT, _PLAIN = 256, 0.5, 3.0
 """Poses among which one to stand in is found, how far joints are off the middle there, as a share of half a range
 and at most 1 rad, and how many condition numbers a joint at its middle is worth."""
 _EYE: Final = frozen_array(np.eye(3))
