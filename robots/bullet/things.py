@@ -38,6 +38,8 @@ from vrs.record import Record
 
 MOST_THINGS: Final = 32
 """Things of a scene."""
+STIRRED: Final = 2e-4
+"""A thing has moved whose place or turn is off by more than this [m, 1] from what was known of it."""
 _MOST_BYTES: Final = 64 * 1024
 _COLOURS: Final = (
     (0.80, 0.25, 0.20), (0.22, 0.45, 0.75), (0.25, 0.60, 0.35), (0.85, 0.62, 0.15), (0.50, 0.35, 0.65),
@@ -142,6 +144,11 @@ class Scene(Record, frozen=True, omit_defaults=True, gc=False, forbid_unknown_fi
         painted = {thing.name: _COLOURS[k % len(_COLOURS)] for k, thing in enumerate(moving)}
         things = (replace(one, colour=one.colour or painted.get(one.name, _FIXED)) for one in self.things)
         return Scene(self.floor, tuple(things))
+
+
+def has_moved(known: ThingPose | None, pose: ThingPose) -> bool:
+    """Whether a thing is elsewhere than was known, by more than `STIRRED`; one of which nothing was known is."""
+    return known is None or max(abs(a - b) for a, b in zip(pose, known, strict=True)) > STIRRED
 
 
 def pose_matrix(pose: Sequence[float]) -> Array:
