@@ -299,8 +299,9 @@ def _one_check(kind: kinds.Type, at: str, where: str) -> str:
             return f"whole({at}, {_ends(kind)}, {place})"
         case kinds.FloatType():
             return f"real({at}, {_ends(kind)}, {place})"
-        case kinds.StrType(pattern=str(pattern)):
-            return f"like({at}, /{pattern.replace(chr(92) + 'A', '^').replace(chr(92) + 'Z', '$')}/, {place})"
+        case kinds.StrType(least, pattern=str(pattern)):
+            begin = f"^(?=.{{{least}}})" if least else "^"
+            return f"like({at}, /{pattern.replace(chr(92) + 'A', begin).replace(chr(92) + 'Z', '$')}/, {place})"
         case kinds.StrType():
             return f"text({at}, {_sizes(kind)}, {place})"
         case kinds.BoolType():

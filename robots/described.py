@@ -102,7 +102,7 @@ def described(what: str) -> DescribedRobot:
     model = arm_model(whole, whole.tip)
     shapes = _arm_shapes(whole)
     chain = rigid_chain(whole, whole.tip)
-    bodies = {world: partial(chain_arm, world, chain, model.limits) for world in WORLDS}
+    bodies = {world: partial(chain_arm, world, chain, model.limits, whole.gravity) for world in WORLDS}
     robot = Robot(
         _called(whole, path),
         model,

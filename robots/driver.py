@@ -172,6 +172,11 @@ class DriverArm(Closing):
                 f"joint {said.joints[joint]} stands at {there:.4g}, not at {q[joint]:.4g} as believed"
             )
 
+    @property
+    def q(self) -> Array:
+        """What was read last [rad], [m], (n,): more isn't known."""
+        return self._readings[-1][1]
+
     def prepare(self, q_ref: ArrayLike, qd_ref: ArrayLike, _qdd_ref: ArrayLike) -> Prepared:
         """Take references as they are: hardware has servos of its own."""
         q = np.asarray(q_ref)

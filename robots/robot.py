@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.base import MobileBase, box_shape, upright
 from robots.solids import LinkShape
-from vrs.checks import did_you_mean, one_of
+from vrs.checks import did_you_mean, one_of, validated, within
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -53,6 +53,8 @@ NUMBERS: Final = "diff:"
 _DESCRIBED: Final = "robots.described"
 _DRIVER: Final = "robots.driver"
 """What reads them; it stands after this module, and is loaded when it's needed."""
+_GOALS = 8
+"""So many openings that fingers were told count for where they are: by then they've been at one."""
 
 
 class Closing:
@@ -112,6 +114,10 @@ class ArmBody(Protocol):
     def release(self) -> None:
         """Drop the load."""
 
+    @property
+    def q(self) -> Array:
+        """Where its joints truly are [rad], of prismatic joints [m], (n,), whatever its encoders read."""
+
 
 class ArmMaker(Protocol):
     """Makes an arm's body, at rest."""
@@ -129,6 +135,15 @@ class ArmMaker(Protocol):
 class ExactArm:
     """A body with no dynamics: it is where its reference is, whatever it holds."""
 
+    def __init__(self, q: ArrayLike = ()) -> None:
+        """Stand at joints [rad], (n,)."""
+        self._q: Array = np.asarray(q, dtype=np.float64)
+
+    @property
+    def q(self) -> Array:
+        """Where it is [rad], (n,)."""
+        return self._q
+
     def prepare(self, q_ref: ArrayLike, qd_ref: ArrayLike, _qdd_ref: ArrayLike) -> Prepared:
         """Take references as they are."""
         q, qd = np.asarray(q_ref), np.asarray(qd_ref)
@@ -136,6 +151,7 @@ class ExactArm:
 
     def follow(self, prepared: Prepared) -> Measured:
         """Go where they are."""
+        self._q = prepared.q[-1] if len(prepared.q) else self._q
         return Measured(*prepared, np.zeros(prepared.q.shape[1], dtype=np.int64))
 
     def attach(self, mass: float) -> None:
@@ -146,9 +162,9 @@ class ExactArm:
 
 
 @contextmanager
-def exact_arm(_q: ArrayLike, **_: object) -> Iterator[ArmBody]:
+def exact_arm(q: ArrayLike, **_: object) -> Iterator[ArmBody]:
     """Make a body that follows exactly."""
-    yield ExactArm()
+    yield ExactArm(q)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,11 +178,46 @@ class Appearance:
 
 
 @dataclass(frozen=True, slots=True)
+@validated
+class Fingers:
+    """Two parallel fingers that move together, along x of the last link, and reach out along its z."""
+
+    stroke: Annotated[float, within(0.001, 1.0, "m")]
+    """How far they open [m]."""
+    force: Annotated[float, within(0.1, 10_000.0, "N")]
+    """With which each of them presses at most [N]."""
+    speed: Annotated[float, within(0.001, 10.0, "m/s")]
+    """At which the hand opens and closes at most [m/s]."""
+    thickness: Annotated[float, within(0.001, 0.2, "m")]
+    """Of a finger, along x [m]."""
+    width: Annotated[float, within(0.001, 0.2, "m")]
+    """Of a finger, along y [m]."""
+    length: Annotated[float, within(0.001, 0.5, "m")]
+    """Of a finger, from where the hand is fastened, along z [m]."""
+
+    def goal(self, goals: Sequence[tuple[float, float]], t: float) -> float:
+        """The opening that they're to go to at a time [s], of what they were told: times [s] and openings [m]."""
+        told = next((opening for at, opening in reversed(goals) if at <= t), self.stroke)
+        return min(told, self.stroke)
+
+    def opening(self, goals: Sequence[tuple[float, float]], t: float) -> float:
+        """How far they're open at a time [s] with nothing in between [m]; see `goal`. They begin open."""
+        known = [goal for goal in goals if goal[0] <= t][-_GOALS:]
+        opening = min(known[0][1], self.stroke) if known else self.stroke
+        for (start, told), end in zip(known, [*(at for at, _ in known[1:]), t], strict=False):
+            most, left = self.speed * max(end - start, 0.0), min(told, self.stroke) - opening
+            opening += min(max(left, -most), most)
+        return opening
+
+
+@dataclass(frozen=True, slots=True)
 class Gripper:
     """A hand that takes and drops loads."""
 
     point: tuple[float, float, float]
-    """Where it holds, in the last link's frame [m]: the point of the tool that is drawn and dragged."""
+    """Where it's fastened, in the last link's frame [m]: the point of the tool that is drawn and dragged."""
+    fingers: Fingers | None = None
+    """With which it grasps things; None of a hand that only takes loads."""
 
 
 @dataclass(frozen=True, slots=True)

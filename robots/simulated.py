@@ -396,7 +396,14 @@ def friction_torques(chain: Chain, qd: Array) -> Array:
 
 
 def chain_arm(
-    world: str, chain: Chain, limits: Limits, q: ArrayLike, *, friction: bool = True, dt: float = 1e-3
+    world: str,
+    chain: Chain,
+    limits: Limits,
+    gravity: float,
+    q: ArrayLike,
+    *,
+    friction: bool = True,
+    dt: float = 1e-3,
 ) -> SimulatedArm:
     """Make the body of a chain of which no more is known: see `robots.robot.ArmMaker`.
 
@@ -406,10 +413,13 @@ def chain_arm(
         world: One of `WORLDS`.
         chain: Its links.
         limits: Of its joints.
+        gravity: Free fall along -z of its base [m/s²].
         q: Joint positions [rad], of prismatic joints [m], (n,).
         friction: Whether its joints have friction.
         dt: Its step [s].
     """
     amid = [limits.q_min + share * (limits.q_max - limits.q_min) for share in (0.35, 0.5, 0.65)]
     inertia = np.mean([np.diag(chain.mass_matrix(one)) for one in amid], axis=0).tolist()
-    return SimulatedArm(chain, q, inertia=inertia, world=world, reality=Reality(friction=friction, dt=dt))
+    return SimulatedArm(
+        chain, q, inertia=inertia, world=world, reality=Reality(friction=friction, gravity=gravity, dt=dt)
+    )

@@ -31,10 +31,10 @@ ENDLESS = "inf"
 _Share = Annotated[float, Meta(ge=1e-3, le=1)]
 _Distance = Annotated[float, Meta(ge=0, le=FARTHEST)]
 if TYPE_CHECKING:
-    _Deviation: TypeAlias = float
+    _Extent: TypeAlias = float
     _Parameter: TypeAlias = Any
 else:
-    _Deviation = _Distance | Literal["inf"]
+    _Extent = _Distance | Literal["inf"]
     _Parameter = (
         bool
         | Annotated[int, Meta(ge=-(10**9), le=10**9)]
@@ -175,7 +175,7 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
     motion: Motion = Motion.JOINT
     profile: Profile = Profile.PARABOLIC
     insertion: Insertion = Insertion.SPLICE
-    deviation: _Deviation = field(default_factory=float)
+    deviation: _Extent = field(default_factory=float)
     """How far the tool may stay away from where the move before it ends [m], so as not to stop there; 0 stops.
 
     Infinity, written as `inf`, is a continuous path: the move begins where the one before it begins to brake, or so
@@ -199,7 +199,7 @@ class MotionCommand(_Command, frozen=True, omit_defaults=True, gc=False, eq=Fals
             if not least <= share <= 1:
                 raise InvalidValueError(name, share, f"a number in (0, 1], at least {least:g} so that it arrives")
             set_field(self, name, _UNCHANGED if share == 1.0 and name != "speed" else share)
-        set_field(self, "deviation", _deviation(self.deviation, endless=True))
+        set_field(self, "deviation", _distance("deviation", self.deviation, endless=True))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, MotionCommand) and self._values() == other._values()
@@ -301,7 +301,7 @@ class InsertVia(_Command, frozen=True, omit_defaults=True, gc=False, tag="via"):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        set_field(self, "deviation", _deviation(self.deviation))
+        set_field(self, "deviation", _distance("deviation", self.deviation))
 
 
 class ScaleTime(_Command, frozen=True, omit_defaults=True, gc=False, tag="scale"):
@@ -358,6 +358,24 @@ class Alter(_Command, frozen=True, omit_defaults=True, gc=False, eq=False, tag="
     """When the path begins to change [s]; None: as soon as possible."""
 
 
+class Grip(_Command, frozen=True, omit_defaults=True, gc=False, tag="grip"):
+    """Let the hand go to an opening, and stay at it, pressing on what is in between.
+
+    The timeline stays as it is, and an undo doesn't take it back.
+    """
+
+    opening: _Extent = field(default_factory=float)
+    """Between its fingers [m]: 0 closes it; infinity, written as `inf`, opens it as far as it goes."""
+    issued_at: Time | None = None
+    """Issue time t_iss [s]; None: whoever registers the command stamps it."""
+    execute_at: Time | None = None
+    """When [s]; None: as soon as possible, which is now, or the end of the plan when offline."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        set_field(self, "opening", _distance("opening", self.opening, endless=True))
+
+
 PlanEdit: TypeAlias = Retime | Cancel | InsertVia | ScaleTime | Stop | Resume | Alter
 """Edits of what is scheduled."""
 
@@ -381,10 +399,10 @@ def _target(name: str, value: object) -> object:
     return value
 
 
-def _deviation(value: object, *, endless: bool = False) -> float:
+def _distance(name: str, value: object, *, endless: bool = False) -> float:
     if endless and isinstance(value, str | float) and value in (ENDLESS, inf):
         return _FOR_EVER
-    return normal(number_in("deviation", value, 0.0, FARTHEST, unit=" m"))
+    return normal(number_in(name, value, 0.0, FARTHEST, unit=" m"))
 
 
 def _transform(name: str, value: ArrayLike) -> Array:
@@ -435,7 +453,9 @@ _CHECKS: dict[str, Callable[[str, Any], object]] = {
 _NEEDED = frozenset(_CHECKS) - {"issued_at", "execute_at", "t", "tool", "rates", "twist", "offset"}
 
 
-Command: TypeAlias = MotionCommand | SteerCommand | DriveCommand | PlanEdit | Redo | PositionQuery | ParameterChange
+Command: TypeAlias = (
+    MotionCommand | SteerCommand | DriveCommand | PlanEdit | Grip | Redo | PositionQuery | ParameterChange
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

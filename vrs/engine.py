@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from enum import Enum
-from math import cos, sin
+from math import cos, inf, sin
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast, overload
 
 import numpy as np
@@ -40,7 +40,7 @@ from vrs.ledger import Ledger, Receipt
 from vrs.model import Array, Limits, RobotModel, frozen_array, home
 from vrs.moves import check
 from vrs.notes import Notes
-from vrs.scheduler import Edited, Scheduler
+from vrs.scheduler import Edited, HandGoal, Scheduler
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -182,6 +182,14 @@ class Engine:
     def pose(self, t: ArrayLike | None = None) -> Array:
         """Pose of the last link in the base frame at t, or now: (4, 4) or (k, 4, 4)."""
         return self.model.forward(self.joints(t))
+
+    def opening(self, t: ArrayLike | None = None) -> Array:
+        """What the hand is told at t, or now [m], () or (k,); infinity for as far open as it goes, as at first."""
+        return self.scheduler.opening(self.now() if t is None else t)
+
+    def begin_with(self, opening: float) -> None:
+        """Let the hand have been told an opening [m] before all else; an engine that was just made begins so."""
+        self.scheduler.grips = (HandGoal(-inf, opening),)
 
     def links(self, t: ArrayLike | None = None) -> Array:
         """Poses of base and links at t, or now: (n + 1, 4, 4) or (k, n + 1, 4, 4)."""

@@ -574,3 +574,5 @@ class Standing:
     steered: tuple[int, float] | None = None
     """The command that the next steering input goes on with, and when that began [s]."""
     known: tuple[LedgerEntry, ...] = ()
+    opening: float = inf
+    """What the hand is told [m]; infinity: as far open as it goes."""

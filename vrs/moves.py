@@ -19,6 +19,7 @@ from vrs import planning
 from vrs.commands import (
     Alter,
     DriveCommand,
+    Grip,
     InsertVia,
     JointTarget,
     Motion,
@@ -45,7 +46,7 @@ from vrs.timeline import Timeline
 _SPATIAL = 6
 """Joints of an arm whose tool can be offset in every direction."""
 
-Checked: TypeAlias = MotionCommand | SteerCommand | PlanEdit | Redo | PositionQuery | ParameterChange
+Checked: TypeAlias = MotionCommand | SteerCommand | PlanEdit | Grip | Redo | PositionQuery | ParameterChange
 """A command that an engine for an arm takes."""
 
 
@@ -58,7 +59,7 @@ def check(command: object, model: RobotModel) -> Checked:
     if isinstance(command, DriveCommand):
         raise InvalidValueError("command", command, f"for an arm: {model.name} has joints and no wheels")
     if not isinstance(command, Checked):
-        allowed = "a MotionCommand, SteerCommand, Redo, PositionQuery, ParameterChange or an edit of the plan"
+        allowed = "a MotionCommand, SteerCommand, Grip, Redo, PositionQuery, ParameterChange or an edit of the plan"
         raise InvalidValueError("command", command, allowed)
     n = model.limits.dof
     if isinstance(command, (MotionCommand, InsertVia)):

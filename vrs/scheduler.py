@@ -10,16 +10,18 @@ Source: Doulgeri, Zikos, Delopoulos, section II-B.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import Enum
 from functools import partial
 from math import inf
-from operator import add
+from operator import add, attrgetter
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from vrs.anchoring import Anchored, anchored
@@ -28,6 +30,7 @@ from vrs.commands import (
     Cancel,
     DriveCommand,
     Frame,
+    Grip,
     Insertion,
     InsertVia,
     JointTarget,
@@ -81,8 +84,8 @@ TimelineT = TypeVar("TimelineT", bound=BaseTimeline[Any])
 REFUSALS = (PlanningError, UnreachablePoseError, InvalidValueError)
 """What planning raises when a command can't be."""
 
-Edited: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit
-"""What changes a timeline."""
+Edited: TypeAlias = MotionCommand | DriveCommand | SteerCommand | PlanEdit | Grip
+"""What changes a timeline, or what the hand does along it."""
 
 _NAMED_AT_ONCE = 64
 """Segments whose commands are named at once; those of longer runs when somebody asks."""
@@ -316,6 +319,19 @@ _ROOM = 1e-3
 """Least room [s] to be filled before what follows a stop."""
 
 
+MOST_GRIPS = 4096
+"""What the hand was told and is remembered, at most."""
+
+
+class HandGoal(NamedTuple):
+    """What the hand is told at a time."""
+
+    t: float
+    """[s]."""
+    opening: float
+    """[m]; infinity for as far as it goes."""
+
+
 class Paused(NamedTuple):
     """What a stop interrupted."""
 
@@ -364,10 +380,12 @@ class Scheduler(BaseScheduler[Timeline]):
         began [s]."""
         self.alteration: Alteration | None = None
         """The newest; it's in force while the timeline is of its version."""
+        self.grips: tuple[HandGoal, ...] = (HandGoal(-inf, inf),)
+        """What the hand was told, by time; it begins open."""
 
     @override
     def carry_out(self, command: Edited, now: float | None) -> Receipt:
-        if self.alteration is None or isinstance(command, (SteerCommand, Alter, Stop, Resume)):
+        if self.alteration is None or isinstance(command, (SteerCommand, Alter, Stop, Resume, Grip)):
             return self._act(command, now)
         return self._under_offset(partial(self._act, command, now), now)
 
@@ -391,6 +409,8 @@ class Scheduler(BaseScheduler[Timeline]):
                 return self._stop(command, now)
             case Resume():
                 return self._resume(command, now)
+            case Grip():
+                return self._grip(command, now)
         raise InvalidValueError("command", command, f"for an arm: {self.model.name} has joints and no wheels")
 
     def _move(self, command: MotionCommand, now: float | None) -> Receipt:
@@ -929,7 +949,25 @@ class Scheduler(BaseScheduler[Timeline]):
         entry = self.entry(number, timing, (t, end), after.version, notes, q=edit.target, superseded_names=names)
         self.note_profile(number, profile)
         self.paused = Paused(after.version, timeline, t)
+        self.grips = tuple(goal for goal in self.grips if goal.t <= t)
         return self.accept(entry, edit, t)
+
+    def _grip(self, command: Grip, now: float | None) -> Receipt:
+        """Let the hand do something at a time."""
+        timing = self.timing(command, now, self.timeline.end)
+        t, number = timing.t, self.ledger.newest + 1
+        entry = self.entry(number, timing, (t, t), self.timeline.version, ())
+        place = bisect_right(self.grips, t, key=attrgetter("t"))
+        grips = (*self.grips[:place], HandGoal(t, command.opening), *self.grips[place:])
+        self.grips = grips[-MOST_GRIPS:]
+        self.ledger.note(entry)
+        self.ledger.newest = number
+        return entry.receipt
+
+    def opening(self, t: ArrayLike) -> Array:
+        """What the hand is told by times [s], () or (k,): its opening [m], infinity for as far as it goes."""
+        known, grips = np.array([goal.t for goal in self.grips]), np.array([goal.opening for goal in self.grips])
+        return np.asarray(grips[np.maximum(np.searchsorted(known, t, side="right") - 1, 0)])
 
     def _resume(self, command: Resume, now: float | None) -> Receipt:
         """Go on with what the newest stop interrupted and dropped.
@@ -1077,12 +1115,13 @@ class Scheduler(BaseScheduler[Timeline]):
             for command_id in sorted(names)[-MOST_KNOWN:]
             if command_id != HOLD and command_id in ledger
         )
-        return Standing(ledger.newest, self.lateness, self.limits, session, known)
+        return Standing(ledger.newest, self.lateness, self.limits, session, known, float(self.opening(now)))
 
     def take_up(self, stand: Standing) -> None:
         """Go on from there; it was just made on the same timeline."""
         self.ledger.newest = stand.newest
         self.lateness, self.limits = stand.lateness, stand.limits
+        self.grips = (HandGoal(-inf, stand.opening),)
         for one in stand.known:
             self.ledger.note(one)
             if one.command is None and one.profile is not None:

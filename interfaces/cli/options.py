@@ -121,6 +121,10 @@ RoomName: TypeAlias = Annotated[
     str,
     option("--room NAME|FILE", "Of a mobile robot or with --rsp, where it drives: a room's name, or a .room file."),
 ]
+SceneFile: TypeAlias = Annotated[
+    Path | None,
+    option("--scene FILE", "Of an arm whose gripper has fingers: what is around it, TOML or JSON."),
+]
 OperatorLossName: TypeAlias = Annotated[
     str,
     option(
@@ -212,7 +216,7 @@ def program_files(directory: Path | None) -> Path | None:
     return directory
 
 
-OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose")
+OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose", "scene")
 """Options that arms alone have, by their names without dashes."""
 OF_VAL: Final = ("val-port", "val-files")
 """The same of robots that VAL-II has places for."""

@@ -22,6 +22,7 @@ from interfaces.cli.options import (
     ReachedAs,
     RobotName,
     RoomName,
+    SceneFile,
     Tip,
     TokenFile,
     access_for,
@@ -177,6 +178,7 @@ def robot(
         float, option("S", "How far ahead the body is told what to do [s], 0.01 to 0.3; it's delay.")
     ] = 0.05,
     body: BodyName = "",
+    scene: SceneFile = None,
     friction: Annotated[bool, option("--friction/--no-friction", "Friction in its joints.")] = True,
     pose: Annotated[str, option("NAME", "Named pose to begin in.")] = POSE,
     reports: Annotated[float, option("N", "How often it says where it is [1/s], 1 to 200.")] = 30.0,
@@ -232,12 +234,14 @@ def robot(
         from interfaces.runtime.live.physics_body import PhysicsBody
         from interfaces.runtime.physics import PhysicsConfig
         from interfaces.teleop import RobotHostConfig, RobotSiteConfig
+        from robots.bullet.things import read_scene
 
         model = chosen.arm
         q = home(model) if pose == POSE else model.poses[one_of("pose", pose, sorted(model.poses))]
         if is_driver(body):
             q = standing(load_driver(body), model.limits)
-        physics = PhysicsConfig(chosen, q, body, friction)
+        around = None if scene is None else read_scene(scene)
+        physics = PhysicsConfig(chosen, q, body, friction, scene=around)
         number_in("lead", lead, 0.01, 0.3, unit=" s")
         site = RobotSiteConfig(fixed_offset=_offset(offset), beat=beat, watchdog=watchdog)
         made, kind = PhysicsBody(physics, RobotHostConfig(site=site, lead=lead, halting=halting)), physics.body

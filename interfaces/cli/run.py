@@ -26,6 +26,7 @@ from interfaces.cli.options import (
     Out,
     ProgramFiles,
     RobotName,
+    SceneFile,
     Tip,
     argument,
     dialect_of,
@@ -57,6 +58,7 @@ def run(
     corrections: Annotated[
         Path | None, option("FILE.csv", "Corrections of the path while the program says ALTER.")
     ] = None,
+    scene: SceneFile = None,
     out: Out = Path("out"),
     limit: Annotated[float, option("S", "When the program is given up [s].", min=1, max=3600)] = 600.0,
 ) -> None:
@@ -71,6 +73,7 @@ def run(
     from interfaces.val2.playing import Listeners
     from interfaces.val2.source import joined
     from interfaces.val2.twins import play
+    from robots.bullet.things import read_scene
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
@@ -81,7 +84,7 @@ def run(
     played = play(
         source, robot, profile,
         seed=seed, offset=D, service=order, limit=limit, listeners=Listeners(_typed, _told, _asked),
-        files=directory, corrections=corrected, keeper=recorder,
+        files=directory, corrections=corrected, keeper=recorder, scene=None if scene is None else read_scene(scene),
     )  # fmt: skip
     summary = conclude(played.plan, played.run, recorder, out, robot, profile, D=D, seed=seed, service=order)
     show(summary, out, recorded=not recorder.problem, err=True)

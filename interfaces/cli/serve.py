@@ -26,6 +26,7 @@ from interfaces.cli.options import (
     ReachedAs,
     RobotNames,
     RoomName,
+    SceneFile,
     Tip,
     TokenFile,
     abandon,
@@ -109,6 +110,7 @@ def serve(
         option("S", "Of the robot that this starts: oldest message that counts under halt [s], 0.01 to 2."),
     ] = 0.5,
     body: BodyName = "",
+    scene: SceneFile = None,
     robot_at: Annotated[
         str | None, option("HOST:PORT", "Where vrs robot listens; without it one is started.")
     ] = None,
@@ -151,6 +153,8 @@ def serve(
     from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.teleop.architectures import architecture as makes
+    from robots.bullet.grasping import fingered
+    from robots.bullet.things import read_scene
     from robots.onboard.watchdog import LossPolicy
 
     names = names or [USUAL]
@@ -166,7 +170,7 @@ def serve(
     if len(robots) > 1:
         left_out(ctx, "of several robots each is started here", ("robot-at", "robot-token-file"))
     if robot_at is not None:
-        its_own = "offset", "max-age", "body", "operator-loss", "architecture"
+        its_own = "offset", "max-age", "body", "operator-loss", "architecture", "scene"
         left_out(ctx, "the robot at --robot-at has its own", its_own)
     elif robot_token_file is not None:
         raise InvalidValueError("robot-token-file", str(robot_token_file), "left out without --robot-at")
@@ -211,6 +215,13 @@ def serve(
         "offset": behind, "max-age": f"{max_age:g}", "body": body, "room": room, "architecture": architecture,
         "operator-loss": operator_loss,
     }  # fmt: skip
+    if scene is not None:
+        # Before a robot is started.
+        for robot in robots:
+            if not robot.is_base:
+                fingered(robot)
+        read_scene(scene)
+        given["scene"] = str(scene)
     access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []

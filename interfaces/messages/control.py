@@ -35,6 +35,8 @@ from interfaces.messages.fields import (
     Value,
     Word,
 )
+from robots.bullet.things import MOST_THINGS as MOST_SCENE_THINGS
+from robots.bullet.things import Scene, ThingPose
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.checks import sized_array
@@ -395,6 +397,8 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
     """Of a mobile robot: name of the room that it drives in."""
     estimates: bool = False
     """Of a mobile robot: whether its virtual one is drawn where the posture estimator has it."""
+    scene: Scene | None = None
+    """Of an arm: what is around it, as it was at first; absent: nothing that it could grasp."""
 
 
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):
@@ -527,6 +531,20 @@ class Problem(Message, frozen=True, omit_defaults=True, gc=False, tag="problem")
     """Of an `Impair`: which of `delay`, `loss` and `service` it's about; empty where it's none of them."""
 
 
+class HandReport(Record, frozen=True, omit_defaults=True, gc=False):
+    """A hand with fingers as it was measured, and what it can reach."""
+
+    opening: Distance
+    """Between the fingers [m]."""
+    goal: Distance
+    """What they were told to go to, as far as they go [m]."""
+    holds: Count | None = None
+    """Which of the things that move both fingers press on, from 0, as in the scene; absent: none."""
+    things: Annotated[tuple[tuple[Count, ThingPose], ...], Meta(max_length=MOST_SCENE_THINGS)] = ()
+    """[number, pose]: where things are that have moved lately, x, y, z [m] and a quaternion x, y, z, w in the arm's
+    base frame; now and then all of them."""
+
+
 class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="state"):
     """The real robot as it was last heard of; the newest one counts."""
 
@@ -564,6 +582,8 @@ class State(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="st
     before, session time [s]. What the real network adds isn't in it."""
     late: Annotated[tuple[tuple[Time, Array], ...], Meta(max_length=MOST_LATE)] = ()
     """[t, joints]: measurements that came after later ones, one of six; each for 0.2 s, so some come twice."""
+    hand: HandReport | None = None
+    """Its hand, and the things around it, measured with `q`; absent where it's in no scene."""
 
 
 class Postures(Leased, frozen=True, omit_defaults=True, gc=False, tag="postures"):

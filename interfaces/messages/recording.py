@@ -31,6 +31,8 @@ from interfaces.messages.fields import (
 )
 from interfaces.messages.segments import MOST_POWERS, placed, written
 from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
+from robots.bullet.things import MOST_THINGS as SCENE_THINGS
+from robots.bullet.things import Scene, ThingPose
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
@@ -230,6 +232,8 @@ class Late(Record, frozen=True, omit_defaults=True, gc=False):
     """The command that the next steering input goes on with."""
     steered_at: Time = 0.0
     """When that began [s]."""
+    grips: Annotated[tuple[tuple[Time, Annotated[float, Meta(ge=0, le=1e6)]], ...], Meta(max_length=1)] = ()
+    """[t, opening]: what the hand was told by then [m]; none where it was as far open as it goes."""
 
 
 class Begin(Entry, frozen=True, omit_defaults=True, gc=False, tag="begin", kw_only=True):
@@ -618,6 +622,25 @@ class RealSample(Record, frozen=True, omit_defaults=True, gc=False):
     """[rad]."""
     reference: Joints | None = None
     """What its own timeline asked for [rad]; None where that isn't known."""
+
+
+class SceneEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="scene"):
+    """What was around the real arm, as it was at first."""
+
+    scene: Scene
+
+
+class HandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="hand"):
+    """The real hand and the things around it, as they were measured."""
+
+    t: Time
+    """User time [s]."""
+    opening: Annotated[float, Meta(ge=0, le=10)]
+    """Between the fingers [m]."""
+    holds: Count | None = None
+    """Which of the things that move both fingers press on, from 0; None for none."""
+    things: Annotated[tuple[tuple[Count, ThingPose], ...], Meta(max_length=SCENE_THINGS)] = ()
+    """[number, pose]: where things are that have moved: x, y, z [m], a quaternion x, y, z, w; in the base frame."""
 
 
 class LinkEntry(Record, frozen=True, omit_defaults=True, gc=False):

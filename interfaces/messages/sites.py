@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 from typing_extensions import override
 
-from interfaces.messages.control import SensedPoints
+from interfaces.messages.control import HandReport, SensedPoints
 from interfaces.messages.fields import (
     MOST_NAMES,
     Coordinate,
@@ -164,6 +164,8 @@ class Report(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="r
     """Where it was measured since the report before, 128 at most, and up to 32 earlier ones that were `wanted`."""
     oldest: Count = 0
     """Number of the oldest sample that it keeps; 0 where it keeps none."""
+    hand: HandReport | None = None
+    """Its hand, and the things around it; None where it's in no scene."""
 
     def __post_init__(self) -> None:
         # A robot that follows nobody yet reports, too, to whoever watches it in its own process.

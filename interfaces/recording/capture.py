@@ -177,6 +177,9 @@ class Capture(SiteObserver[Report, Timeline]):
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         """The same of samples."""
 
+    def grasped(self, report: Report, *, now: float) -> None:
+        """The same of its hand."""
+
     def failed(self, error: Exception) -> None:
         """Let a run in virtual time fail: what it records is all that comes of it."""
         raise error
@@ -328,15 +331,16 @@ def link_entry(direction: Direction, record: PacketRecord, size: int = 0) -> tup
     return known, LinkEntry(direction, record.sent, record.arrived, lost, record.attempts, size)
 
 
-def late_of(stand: Standing | None) -> Late | None:
-    """How an engine stood, as it's written at the beginning."""
+def late_of(stand: Standing | None, t: float) -> Late | None:
+    """How an engine stood when a recording begins [s], as it's written there."""
     if stand is None:
         return None
     steered, at = (None, 0.0) if stand.steered is None else stand.steered
     limits = stand.limits
     return Late(
-        stand.newest, limits.qd_max.tolist(), limits.qdd_max.tolist(), limits.qddd_max.tolist(), steered, at
-    )
+        stand.newest, limits.qd_max.tolist(), limits.qdd_max.tolist(), limits.qddd_max.tolist(), steered, at,
+        () if stand.opening == math.inf else ((t, stand.opening),),
+    )  # fmt: skip
 
 
 def _anchor(number: int, correction: Correction, truth: Timeline, version: int) -> Anchor:

@@ -42,6 +42,8 @@ class RecordingChannel:
     """Foxglove's own schema; None where it's made from the kinds."""
     many: bool = True
     """Whether it has many messages; those of the others stand together, in blocks of their own."""
+    rare: bool = False
+    """Whether a file has it only from its first message on."""
 
     @property
     def kinds(self) -> Kinds:
@@ -82,6 +84,7 @@ CHANNELS: Final = (
     RecordingChannel("/real/measured", "vrs.MeasuredPosture", (), (m.MeasuredPosture,)),
     RecordingChannel("/virtual/estimated", "vrs.EstimatedPosture", (), (m.EstimatedPosture,)),
     RecordingChannel("/environment", "vrs.Cells", (), (m.CellsEntry,), many=False),
+    RecordingChannel("/hand", "vrs.Hand", (m.SceneEntry, m.HandEntry), (), rare=True),
 )
 """Every channel of a recording."""
 

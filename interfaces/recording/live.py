@@ -18,10 +18,12 @@ from interfaces.messages.recording import (
     Begin,
     CommandRecord,
     End,
+    HandEntry,
     MeasuredPosture,
     RealPosture,
     RealSample,
     RunEvent,
+    SceneEntry,
 )
 from interfaces.messages.sites import DriveReport, Report, Sample
 from interfaces.recording.capture import Capture, late_of
@@ -37,6 +39,7 @@ from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.samples import PERIOD
 from interfaces.teleop.virtual_base import VirtualBase
 from robots.bullet.rooms import Room
+from robots.bullet.things import Scene, ThingPose, has_moved
 from vrs.ledger import Receipt, Status
 from vrs.timeline import Timeline
 
@@ -126,7 +129,7 @@ class LiveRecorder(Capture):
             software=software(),
             began=began,
             sampled=PERIOD if drives is None else None,
-            late=late_of(self.late),
+            late=late_of(self.late, now),
             drive=None if drives is None else drives.facts(what.robot or name, what.architecture),
             found_by=fields.text(what.found_by),
         )
@@ -136,6 +139,9 @@ class LiveRecorder(Capture):
         self._samples: list[_Measured] = []
         self._connected = self._halted = self._followed = False
         self._stopped, self._told = "", False
+        self._scene: Scene | None = None
+        self._things: dict[int, ThingPose] = {}
+        """Where things were written down to be, by number."""
         self._rest: tuple[End, tuple[Receipt, ...]] | None = None
 
     @override
@@ -247,6 +253,21 @@ class LiveRecorder(Capture):
         for one in () if self._drives is not None else samples:
             q, reference = one.q.tolist(), None if one.reference is None else one.reference.tolist()
             self._measure(one.t, q, RealSample(one.t, one.play, q, reference))
+
+    @override
+    def grasped(self, report: Report, *, now: float) -> None:
+        hand, t = report.hand, report.measured_at
+        if hand is not None and t >= self.since and not self._stopped:
+            moved = tuple((k, pose) for k, pose in hand.things if has_moved(self._things.get(k), pose))
+            self._things.update(moved)
+            self.add(t, HandEntry(t, hand.opening, hand.holds, moved))
+
+    def furnish(self, scene: Scene | None) -> None:
+        """Write down what is around the real arm, where that's news."""
+        if scene is not None and scene != self._scene:
+            self._scene = scene
+            self._things.clear()
+            self.add(self.since, SceneEntry(scene))
 
     def _measure(self, t: float, q: Sequence[float], *messages: Message) -> None:
         """Take a sample; what was measured before the recording began is compared with nothing in it."""

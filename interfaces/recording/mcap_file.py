@@ -184,16 +184,28 @@ class McapFile:
         """Bytes of messages that wait."""
         return len(self._few.records) + len(self._many.records)
 
-    def add_channel(self, number: int, topic: str, schema: str, json_schema: bytes, *, many: bool) -> None:
-        """Add a channel of JSON messages under a number that no other has, from 1."""
+    def add_channel(
+        self, number: int, topic: str, schema: str, json_schema: bytes, *, many: bool, beside: bool = False
+    ) -> None:
+        """Add a channel of JSON messages.
+
+        Args:
+            number: That no other has, from 1.
+            topic: Of the channel.
+            schema: Name of the schema.
+            json_schema: The schema.
+            many: Whether it has many messages.
+            beside: Whether it's told where its own messages stand, whose first comes next; else among the few.
+        """
+        told = self._many if many and beside else self._few
         named = next((known for known in self._schemas if known.name == schema), None)
         if named is None:
             named = Schema(id=len(self._schemas) + 1, data=json_schema, encoding="jsonschema", name=schema)
             self._schemas.append(named)
-            self._few.records += _bytes(named)
+            told.records += _bytes(named)
         channel = Channel(id=number, topic=topic, message_encoding="json", metadata={}, schema_id=named.id)
         self._channels.append(channel)
-        self._few.records += _bytes(channel)
+        told.records += _bytes(channel)
         self._open[number] = many
 
     def add(self, channel: int, log_time: int, data: bytes) -> None:

@@ -29,14 +29,17 @@ from interfaces.messages.recording import (
     RoomEntry,
     RunEvent,
 )
+from interfaces.recording.hands import RecordedHands
 from interfaces.recording.history import AnyEdit, AnyTimeline, Chain, RecordedEdit, sampled
 from interfaces.recording.kinds import ARM, MOBILE, RecordingKind
 from interfaces.recording.mcap_reading import NUMBERS, Blocks, Damage, FileSource
 from interfaces.recording.track import Log, SampleTrack, Tracks
 from robots.robot import BARE, Robot, described, load, names
+from vrs.commands import Grip
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
 from vrs.model import Array, frozen_array
+from vrs.scheduler import HandGoal
 from vrs.segment import times
 
 POSTURE = 3
@@ -91,6 +94,9 @@ class Recording:
             told = len(begin.q) if begin.drive is None else 2
             self._tracks = Tracks(self._blocks, len(begin.q), told, str(path))
             self._chain, self._applied = Chain(str(path)), 0
+            self._told: tuple[int, tuple[HandGoal, ...]] = (-1, ())
+            self.hands = RecordedHands(self.logs["/hand"].entries)
+            """The real arm's hand, and the things around it."""
         except FormatError:
             self._source.close()
             raise
@@ -236,6 +242,21 @@ class Recording:
             elif isinstance(entry, CommandRecord | GivenEntry) and site == "virtual" and entry.receipt is not None:
                 found[entry.receipt.command_id] = entry.receipt
         return tuple(found[command_id] for command_id in sorted(found))
+
+    @property
+    def grips(self) -> tuple[HandGoal, ...]:
+        """What the hand was told, by time."""
+        count = len(self._commands())
+        if self._told[0] == count:
+            return self._told[1]
+        late = self.session.late
+        goals = [HandGoal(*goal) for goal in (() if late is None else late.grips)]
+        for entry in self.commands:
+            if isinstance(entry, CommandRecord) and isinstance(entry.command, Grip):
+                at = None if entry.receipt is None else entry.receipt.execute_at
+                goals += [] if at is None else [HandGoal(at, float(entry.command.opening))]
+        self._told = count, tuple(sorted(goals))
+        return self._told[1]
 
     @property
     def packets(self) -> tuple[CommandPacket, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -57,7 +58,10 @@ def _stand(recording: Recording, late: Late, engine: Engine) -> Standing:
         engine.limits, **{name: np.array(getattr(late, name)) for name in ("qd_max", "qdd_max", "qddd_max")}
     )
     steered = None if late.steered is None else (late.steered, late.steered_at)
-    return Standing(late.newest, Lateness(recording.session.lateness), limits, steered, recording.given)
+    lateness = Lateness(recording.session.lateness)
+    return Standing(
+        late.newest, lateness, limits, steered, recording.given, late.grips[0][1] if late.grips else math.inf
+    )
 
 
 def rerun(recording: Recording) -> Rerun:

@@ -23,12 +23,14 @@ from interfaces.messages.recording import (
     EditEntry,
     End,
     EstimatedPosture,
+    HandEntry,
     HistoryEntry,
     LinkEntry,
     MeasuredPosture,
     RealPosture,
     RealSample,
     RunEvent,
+    SceneEntry,
     grid_facts,
     room_entry,
 )
@@ -44,7 +46,9 @@ from interfaces.system import software
 from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
+from robots.bullet.grasping import HandState
 from robots.bullet.rooms import EMPTY
+from robots.bullet.things import ThingPose, has_moved
 from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE
@@ -101,6 +105,10 @@ class RunRecorder(_FileRecorder):
         self._capture: Capture | None = None
         self._events: set[RunEvent] = set()
         self._packets: dict[int, CommandPacket] = {}
+        self._hands: dict[int, ThingPose] = {}
+        """Where things were written down to be, by number."""
+        self._hand: tuple[float, int | None] | None = None
+        """How the hand was written down: its opening [m], and what it held."""
         self._end = 0.0
 
     def begin(self, begin: Begin, operator: OperatorSite[VirtualArm]) -> None:
@@ -128,11 +136,25 @@ class RunRecorder(_FileRecorder):
         for now, play, q, reference in rows:
             capture.add(now, RealSample(now, play, q, reference))
         capture.show("real", t, turn.q_real)
+        if turn.scene is not None and self._hand is None:
+            capture.add(0.0, SceneEntry(turn.scene))
+        for now, state in turn.hands:
+            self._show_hand(now, state)
         t_virtual, q_virtual = capture.sample(now=turn.now)
         # Both robots have samples at the same times, but for the last ones of a run.
         k = min(len(t), len(t_virtual))
         capture.show_links(t[:k], virtual=q_virtual[:k], real=turn.q_real[:k])
         capture.write_out()
+
+    def _show_hand(self, t: float, state: HandState) -> None:
+        """Write down the hand, and the things that have moved since they were written down."""
+        assert self._capture is not None
+        moved = tuple((k, pose) for k, pose in enumerate(state.poses) if has_moved(self._hands.get(k), pose))
+        self._hands.update(moved)
+        told = round(state.opening, 5), state.holds
+        if moved or told != self._hand:
+            self._hand = told
+            self._capture.add(t, HandEntry(t, *told, moved))
 
     def _tell_event(self, event: RunEvent, t: float) -> None:
         if event not in self._events and self._capture is not None:

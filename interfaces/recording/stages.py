@@ -13,10 +13,15 @@ from interfaces.recording.playback import PlaybackFrame
 from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
+from interfaces.teleop.predicted_grasp import Hands, PredictedGrasp
+from robots.bullet.things import Scene
+from robots.robot import Gripper
 from vrs.model import Array
 
 MARGIN = 3.0
 """So much floor is seen around the paths, in lengths of the robot."""
+JUMP = 1.0
+"""A play head that goes on by more at once [s] has been put elsewhere."""
 THIN = 2
 """One of so many samples is a point of a path that is drawn."""
 
@@ -45,6 +50,10 @@ class Stage:
             around["grid"] = None if facts is None or facts.grid is None else grid_of(facts.grid)
             around["extent"] = self._extent()
         self.scene = TwinScene(recording.robot, looks=bodies(recording.robot), **around)
+        gripper = recording.robot.device(Gripper)
+        self._fingers = None if gripper is None else gripper.fingers
+        self._grasp = None if gripper is None or gripper.fingers is None else PredictedGrasp(gripper)
+        self._shown = -np.inf
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
         """Show a frame whose virtual robot is known."""
@@ -61,7 +70,27 @@ class Stage:
             }
             around["learned"] = changes[bisect_right(changes, frame.t, key=lambda change: change[0]) - 1][1]
             around["t"] = frame.t
+        if self._fingers is not None:
+            around["hands"] = self._hands(frame, frame.q_virtual)
         self.scene.show(virtual=frame.q_virtual, real=frame.q_real, path=committed, now=now, **around)
+
+    def _hands(self, frame: PlaybackFrame, q: Array) -> Hands:
+        """Both hands, and the things where they were measured, or where the virtual hand has taken one."""
+        assert self._grasp is not None
+        assert self._fingers is not None
+        recording, t, before = self._recording, frame.t, self._shown
+        scene, goals, poses = recording.hands.scene, recording.grips, recording.hands.poses(t)
+        self._shown = t
+        if not before <= t < before + JUMP or scene != self._grasp.scene:
+            # What it has closed on is seen from there on.
+            self._grasp = PredictedGrasp(self._grasp.gripper, scene or Scene(0.0))
+            if scene is not None:
+                self.scene.furnish(scene)
+        opening, predicted = self._grasp.advance(recording.model.forward(q), goals, poses, now=t)
+        real = recording.hands.opening(t)
+        if real is None and frame.play is not None:
+            real = self._fingers.opening(goals, frame.play)
+        return Hands(opening, real, poses, predicted)
 
     def _grown(self) -> None:
         """Take the paths as far as the file has come."""

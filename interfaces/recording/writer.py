@@ -9,7 +9,7 @@ import msgspec
 
 from interfaces.messages.fields import plain
 from interfaces.messages.recording import FORMAT, Begin, End, SegmentedEntry
-from interfaces.recording.channels import CHANNELS, NUMBER_OF, Message
+from interfaces.recording.channels import CHANNELS, NUMBER_OF, Kinds, Message
 from interfaces.recording.mcap_file import McapFile, RawFile, RecordingError, Sink
 from interfaces.recording.mcap_reading import LONGEST
 from interfaces.recording.poses import nanoseconds
@@ -54,11 +54,13 @@ class RecordingWriter:
         """Whether nothing more can be written."""
         try:
             self._file = McapFile(self._sink, FORMAT, session.software)
+            self._rare: set[int] = set()
+            """Numbers of channels that aren't there yet."""
             for number, channel in enumerate(CHANNELS, 1):
-                kinds = channel.arm if session.drive is None else channel.mobile
-                if kinds:
-                    schema = channel.json_schema(kinds)
-                    self._file.add_channel(number, channel.topic, channel.schema, schema, many=channel.many)
+                if channel.rare:
+                    self._rare.add(number)
+                elif kinds := channel.arm if session.drive is None else channel.mobile:
+                    self._add_channel(number, kinds)
             self.write(session, t=session.t)
             self.flush()
         except RecordingError:
@@ -107,7 +109,17 @@ class RecordingWriter:
                 self._told = at
                 self._file.add(NUMBER_OF[Begin], at, self._session)
         self._newest = max(self._newest, t)
+        if number in self._rare:
+            self._rare.discard(number)
+            self._add_channel(number, CHANNELS[number - 1].kinds)
         self._file.add(number, at, data)
+
+    def _add_channel(self, number: int, kinds: Kinds) -> None:
+        channel = CHANNELS[number - 1]
+        schema = channel.json_schema(kinds)
+        self._file.add_channel(
+            number, channel.topic, channel.schema, schema, many=channel.many, beside=channel.rare
+        )
 
     def flush(self) -> None:
         """Close the block: what was written is in the file.

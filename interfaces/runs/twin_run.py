@@ -15,6 +15,8 @@ from interfaces.link import ConstantDelay, DelayProfile, PacketRecord
 from interfaces.link.delays import MAX_DELAY
 from interfaces.messages.recording import Begin, CommandPacket, RunEvent
 from interfaces.teleop import Correction, OperatorSite, VirtualArm
+from robots.bullet.grasping import HandState
+from robots.bullet.things import Scene
 from robots.robot import Robot
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
@@ -315,6 +317,10 @@ class Turn(NamedTuple):
     events: tuple[RunEvent, ...]
     packets: tuple[CommandPacket, ...]
     """Of commands that the robot has answered."""
+    hands: tuple[tuple[float, HandState], ...] = ()
+    """When the hand and the things around it were measured [s], and how; none of a robot without."""
+    scene: Scene | None = None
+    """What is around the robot; None where nothing is that it could grasp."""
 
 
 class RunKeeper(Protocol):

@@ -16,6 +16,7 @@ from interfaces.messages.sites import Orders, Report
 from interfaces.teleop.following_arm import FollowingArm, JointReference
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_arm import VirtualArm
+from robots.bullet.grasping import GraspingArm, HandState
 from robots.onboard.playout import PlayState
 from robots.robot import ArmBody
 from vrs.checks import finite
@@ -116,6 +117,8 @@ class Laboratory:
             raise InvalidValueError("every", every, "a whole number ≥ 1")
         self._tick, self._every, self._body = tick, every, body
         self._start, self._ticks = now, 0
+        self._told = math.inf
+        """What the hand was told last [m]."""
         self.arrivals: dict[tuple[int, int], float] = {}
         """When each entry of the operator's log first reached the robot [s], by epoch and number."""
         self.answers: dict[tuple[int, int], Receipt] = {}
@@ -128,6 +131,8 @@ class Laboratory:
         self._play: list[Array] = []
         self._followed: list[JointReference] = []
         self._measured: list[Array] = []
+        self.hands: list[tuple[float, HandState]] = []
+        """When the hand and the things around it were measured [s], and how; none of a body without."""
 
     def schedule(self, t: float, action: Action) -> None:
         """Let something be done at a time [s]."""
@@ -204,10 +209,32 @@ class Laboratory:
         self._play.append(np.column_stack((t[rows], *(column[rows] for column in play))))
         if self._body is not None:
             reference = self.robot.reference(play)
-            measured = self._body.follow(self._body.prepare(*reference)).q
+            measured = self._moved(t, play, reference)
             self._followed.append(JointReference(*(column[rows].copy() for column in reference)))
             self._measured.append(measured[rows].copy())
             self.robot.measured(measured[-1], now=float(t[-1]))
+
+    def _moved(self, t: Array, play: PlayState, reference: JointReference) -> Array:
+        """Let body and hand follow what they're told for times (m,) [s]; measured joints [rad], (m, n)."""
+        body = self._body
+        assert body is not None
+        if not isinstance(body, GraspingArm):
+            return body.follow(body.prepare(*reference)).q
+        # A tick's end is a row of the record where its number is a multiple; the hand is told before its tick.
+        openings, first = self.robot.openings(play), self._ticks - len(t)
+        told = np.flatnonzero(openings != np.concatenate([[self._told], openings[:-1]]))
+        rows = np.arange(-(first + 1) % self._every, len(t), self._every) + 1
+        measured, start = [], 0
+        for end in sorted({*told.tolist(), *rows.tolist(), len(t)}):
+            if end > start:
+                measured.append(body.follow(body.prepare(*(part[start:end] for part in reference))).q)
+                self.hands.append((float(t[end - 1]), body.state()))
+                self.robot.hand(self.hands[-1][1])
+            if end < len(t) and openings[end] != self._told:
+                self._told = float(openings[end])
+                body.grip(self._told)
+            start = end
+        return np.concatenate(measured)
 
     def blocks(self, since: int) -> Iterator[tuple[Array, Array, Array]]:
         """What a body's record got, block by block: rows of `play`, references and measured joints [rad], (k, n).

@@ -22,6 +22,7 @@ from interfaces.runtime.physics_messages import (
     Attach,
     Close,
     Fault,
+    Grips,
     Measurement,
     News,
     Order,
@@ -33,7 +34,9 @@ from interfaces.runtime.physics_messages import (
     encode,
 )
 from interfaces.teleop import JointReference, RobotHost
-from robots.robot import IDEAL, Robot
+from robots.bullet.grasping import fingered
+from robots.bullet.things import Scene
+from robots.robot import IDEAL, Robot, is_driver
 from vrs.checks import finite_array, number_in, validated, within
 from vrs.clock import WallClock
 from vrs.errors import InvalidValueError, VrsError
@@ -71,6 +74,8 @@ class PhysicsConfig:
     """Whether its joints have friction."""
     every: Annotated[int, within(1, 1000)] = 10
     """Ticks from one report to the next, in [1, 1000]."""
+    scene: Scene | None = None
+    """What is around it, of a robot whose gripper has fingers; None for nothing that it could grasp."""
 
     def __post_init__(self) -> None:
         limits = self.robot.arm.limits
@@ -78,7 +83,11 @@ class PhysicsConfig:
         limits.check(q, self.robot.arm.prismatic)
         object.__setattr__(self, "q", q)
         object.__setattr__(self, "body", self.robot.body_name(self.body))
-        if self.body != IDEAL and not self.robot.found_by:
+        if self.scene is not None:
+            fingered(self.robot)
+            if is_driver(self.body):
+                raise InvalidValueError("scene", self.body, "left out of a driver's body: hardware has its own")
+        if (self.body != IDEAL or self.scene is not None) and not self.robot.found_by:
             raise InvalidValueError("robot", self.robot.name, "one that robots.load finds, as its process does")
         if isinstance(self.every, bool) or not isinstance(self.every, int):
             raise InvalidValueError("every", self.every, "a whole number in [1, 1000]")
@@ -141,7 +150,7 @@ class PhysicsProcess:
             PhysicsSetup(
                 config.robot.found_by, config.body, config.friction, TICK, config.every, clock.origin, os.getpid(),
                 tuple(config.q.tolist()), tuple(tuple(bound.tolist()) for bound in bounds),  # type: ignore[arg-type]
-                tuple(config.robot.arm.prismatic),
+                tuple(config.robot.arm.prismatic), config.scene,
             )
         )  # fmt: skip
 
@@ -154,7 +163,14 @@ class PhysicsProcess:
         """The descriptor that can be read when there's something to `poll`."""
         return self._socket.fileno()
 
-    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
+    def feed(
+        self,
+        reference: JointReference,
+        start: int,
+        *,
+        placed: bool = False,
+        grips: Grips = (),
+    ) -> bool:
         """Give references, which count for their ticks and instead of all that was given for later ones.
 
         After the last one its position is held, if it's at rest; if it's not, the body brakes and tells a fault.
@@ -163,6 +179,7 @@ class PhysicsProcess:
             reference: A row a tick, 1 to `ROWS_MOST` of them.
             start: Tick of the first.
             placed: Whether the reference may jump to the first row, which is at rest where the body was measured.
+            grips: What the hand is told at ticks from the first on; a body without one passes it over.
 
         Returns:
             Whether they were sent: not before it's ready, and not when it has ended or doesn't read.
@@ -176,7 +193,7 @@ class PhysicsProcess:
         if any(np.shape(part) != shape for part in reference):
             raise InvalidValueError("reference", [np.shape(part) for part in reference], "of one shape")
         rows = np.stack(reference, axis=1).astype(np.float64, copy=False)
-        return self._ready and self._send(Rows(self._run, start, placed, rows.tobytes()))
+        return self._ready and self._send(Rows(self._run, start, placed, rows.tobytes(), grips))
 
     def acknowledge(self, fault: Fault) -> None:
         """Let what is fed from now on count: it begins where the fault's stop rests; see `References.restart`."""
@@ -312,8 +329,15 @@ FEED = 0.1
 class Fed(Protocol):
     """What takes references; see `PhysicsProcess`."""
 
-    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
-        """Give references from a tick on."""
+    def feed(
+        self,
+        reference: JointReference,
+        start: int,
+        *,
+        placed: bool = False,
+        grips: Grips = (),
+    ) -> bool:
+        """Give references from a tick on, and what the hand is told."""
 
     def acknowledge(self, fault: Fault) -> None:
         """Let what is fed from now on count."""
@@ -327,15 +351,16 @@ class Feeder:
     course, as that the arm needn't brake yet.
     """
 
-    def __init__(self, host: RobotHost, body: Fed, *, now: float) -> None:
+    def __init__(self, host: RobotHost, body: Fed, *, now: float, grasps: bool = False) -> None:
         """Begin to feed.
 
         Args:
             host: What decides, its lead ahead.
             body: What follows.
             now: By the robot's clock [s].
+            grasps: Whether the body has a hand that's to be told, too.
         """
-        self._host, self._body = host, body
+        self._host, self._body, self._grasps = host, body, grasps
         self._references = References(host.reference, now=self._ahead(now))
         self._fed, self._stale, self._placed = -math.inf, True, False
         self._fault: Fault | None = None
@@ -374,9 +399,16 @@ class Feeder:
         """Give the body its references, from where it has them for certain."""
         if self._fault is None:
             first, rows = self._references.take(now=self._ahead(now))
-            self._body.feed(rows, first, placed=self._placed)
+            self._body.feed(rows, first, placed=self._placed, grips=self._grips(first) if self._grasps else ())
             self._placed = False
         self._fed, self._stale = now, False
+
+    def _grips(self, first: int) -> Grips:
+        """What the hand is told from a tick on, and when that changes."""
+        t: Array = TICK * np.arange(first, first + _AHEAD, dtype=np.float64)
+        openings = self._host.openings(t)
+        changes = np.flatnonzero(np.concatenate([[True], openings[1:] != openings[:-1]]))
+        return tuple(zip((first + changes).tolist(), openings[changes].tolist(), strict=True))
 
     def _ahead(self, now: float) -> float:
         """For when of the body's time is decided at now [s]."""

@@ -13,6 +13,8 @@ from typing import TypeAlias, TypeVar
 import msgspec
 import numpy as np
 
+from robots.bullet.grasping import HandState
+from robots.bullet.things import Scene
 from vrs.errors import FormatError
 from vrs.model import Array, Limits
 
@@ -25,6 +27,8 @@ MESSAGE_MOST = 1 << 18
 
 Row: TypeAlias = tuple[float, ...]
 """A number a joint."""
+Grips: TypeAlias = tuple[tuple[int, float], ...]
+"""[tick, opening]: what a hand is told and from when on [m]."""
 
 
 class FaultKind(StrEnum):
@@ -75,6 +79,8 @@ class PhysicsSetup(msgspec.Struct, frozen=True, tag="setup"):
     """q_min, q_max [rad], qd_max [rad/s], qdd_max [rad/s²], qddd_max [rad/s³]; of prismatic joints in m for rad."""
     prismatic: tuple[int, ...] = ()
     """Which are, from 0."""
+    scene: Scene | None = None
+    """What is around it; None for nothing that it could grasp."""
 
     def joint_limits(self) -> Limits:
         """The limits as a value."""
@@ -95,6 +101,8 @@ class Rows(msgspec.Struct, frozen=True, tag="rows"):
     """Whether the reference may go to the first at once: it's at rest, near where the body was measured."""
     data: bytes
     """q [rad], qd [rad/s], qdd [rad/s²]: float64, (k, 3, n)."""
+    grips: Grips = ()
+    """What the hand is told at ticks from `start` on, instead of all that came before for these."""
 
     def array(self, n: int) -> Array:
         """The rows, (k, 3, n), read-only.
@@ -188,6 +196,8 @@ class Measurement(msgspec.Struct, frozen=True, tag="measured"):
     followed: int
     """Tick that the reference was meant for: an earlier one where rows came late and the motion began late."""
     counts: TickCounts
+    hand: HandState | None = None
+    """The hand and the things around it; None of a body without."""
 
 
 class Fault(msgspec.Struct, frozen=True, tag="fault"):

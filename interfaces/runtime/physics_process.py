@@ -23,8 +23,9 @@ from interfaces.runtime.physics_messages import (
     decode_order,
     encode,
 )
-from interfaces.runtime.tick_loop import Moved, TickBody, TickLoop
+from interfaces.runtime.tick_loop import Moved, TickLoop
 from interfaces.system import hasten
+from robots.bullet.grasping import GraspingArm, grasping
 from robots.robot import IDEAL, ArmBody, Prepared, exact_arm, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError
@@ -45,6 +46,8 @@ class BodyTicks:
 
     def __init__(self, arm: ArmBody) -> None:
         self.arm = arm
+        self.hand = arm if isinstance(arm, GraspingArm) else None
+        """Its hand; None where it has none that grasps."""
 
     def prepare(self, rows: Array) -> Sequence[Prepared]:
         """Work out the feed-forward."""
@@ -66,9 +69,11 @@ class BodyTicks:
 
 
 @contextmanager
-def tick_body(setup: PhysicsSetup) -> Iterator[TickBody]:
+def tick_body(setup: PhysicsSetup) -> Iterator[BodyTicks]:
     """Make the body that the parent wants."""
     make = exact_arm if setup.body == IDEAL else load(setup.robot).body(setup.body)
+    if setup.scene is not None:
+        make = grasping(make, load(setup.robot), setup.scene)
     with make(setup.q, friction=setup.friction, dt=setup.tick) as arm:
         yield BodyTicks(arm)
 
@@ -141,6 +146,7 @@ def run(connection: socket.socket) -> int:
             now=clock.now(),
             realtime=realtime,
             prismatic=setup.prismatic,
+            hand=body.hand,
         )
         _tick(loop, parent, clock)
     messages.flush(_LAST_WORDS)

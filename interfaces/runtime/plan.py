@@ -13,8 +13,10 @@ import msgspec
 import numpy as np
 
 from interfaces.system import read_within
+from robots.bullet.things import Scene, Thing
 from vrs.checks import one_of
 from vrs.commands import (
+    Grip,
     Insertion,
     JointTarget,
     Motion,
@@ -39,12 +41,14 @@ MAX_COMMANDS = 5000
 ALLOWED = (
     'a line is a JSON object: {"issue": seconds, "move": target} with optional execute, register, speed, '
     'motion, profile, insertion; or {"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
-    '"release": true}; or, first, a header with schema, title, start; each with an optional comment'
+    '"release": true}; or {"issue": seconds, "grip_mm": opening, or "open"} with optional execute, register; '
+    'or {"thing": {name, at, box or cylinder, mass}}, with a header that has floor; '
+    "or, first, a header with schema, title, start, floor; each with an optional comment"
 )
 
 
-PlannedCommand: TypeAlias = MotionCommand | SteerCommand | PlanEdit
-"""What an operator may do to the timeline; plan files hold motion commands alone."""
+PlannedCommand: TypeAlias = MotionCommand | SteerCommand | PlanEdit | Grip
+"""What an operator may do; plan files hold motion commands and grips alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +84,8 @@ class RunPlan:
     motions: tuple[PlannedMotion, ...]
     """A plan file holds at least one."""
     payloads: tuple[PlannedPayload, ...]
+    scene: Scene | None = None
+    """What is around the real robot; None for nothing that it could grasp."""
 
 
 class _Where(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -110,10 +116,13 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     insertion: Insertion | None = None
     payload: _Load | None = None
     release: bool | None = None
+    grip_mm: float | Literal["open"] | None = None
+    floor: float | None = None
+    thing: Thing | None = None
     comment: str | None = None
 
 
-_HEADER = ("schema", "title", "start")
+_HEADER = ("schema", "title", "start", "floor")
 _MOTION = ("register", "execute", "speed", "motion", "profile", "insertion")
 
 
@@ -164,28 +173,39 @@ def parse_plan(data: bytes, name: str, model: RobotModel) -> RunPlan:
     title, start = Path(name).stem, home(model)
     motions: list[PlannedMotion] = []
     payloads: list[PlannedPayload] = []
+    floor: float | None = None
+    things: list[Thing] = []
     for i, (where, line) in enumerate(_lines(data, name)):
         try:
             if any(getattr(line, key) is not None for key in _HEADER):
                 _check_header(line, first=i == 0)
                 title = line.title or title
                 start = start if line.start is None else _start(line.start, model)
+                floor = line.floor
             elif line.move is not None:
                 motions.append(_motion(line, line.move, where, model))
             elif line.payload is not None or line.release is not None:
                 payloads.append(_payload(line, where))
+            elif line.grip_mm is not None:
+                motions.append(_grip(line, line.grip_mm, where))
+            elif line.thing is not None:
+                things.append(_thing(line, line.thing, floor))
             elif any(getattr(line, key) is not None for key in ("issue", *_MOTION)):
-                raise InvalidValueError("line", "issue without an action", "one of move, payload, release")
+                raise InvalidValueError("line", "issue without an action", "one of move, payload, release, grip_mm")
         except (InvalidValueError, UnreachablePoseError) as error:
             raise FormatError(where, str(error)) from None
         if len(motions) + len(payloads) > MAX_COMMANDS:
             raise FormatError(where, f"more than the {MAX_COMMANDS} commands allowed")
     if not motions:
         raise FormatError(name, f"holds no move; {ALLOWED}")
+    try:
+        scene = None if floor is None else msgspec.convert({"floor": floor, "things": things}, Scene)
+    except msgspec.ValidationError as error:
+        raise FormatError(name, str(error)) from None
     motions.sort(key=lambda motion: motion.registered_at)
     payloads.sort(key=lambda payload: payload.t)
     _check_hand(payloads)
-    return RunPlan(title, start, tuple(motions), tuple(payloads))
+    return RunPlan(title, start, tuple(motions), tuple(payloads), scene)
 
 
 def _lines(data: bytes, name: str) -> Iterator[tuple[str, _Line]]:
@@ -235,6 +255,26 @@ def _motion(line: _Line, move: _Move, where: str, model: RobotModel) -> PlannedM
         insertion=line.insertion or Insertion.SPLICE,
     )
     return PlannedMotion(where, registered, command)
+
+
+def _grip(line: _Line, opening: float | str, where: str) -> PlannedMotion:
+    _only(line, ("issue", "grip_mm", "register", "execute", "comment"), "a grip")
+    issue = _time("issue", line.issue)
+    command = Grip(
+        opening=math.inf if isinstance(opening, str) else opening / 1000.0,
+        issued_at=issue,
+        execute_at=None if line.execute is None else _time("execute", line.execute),
+    )
+    return PlannedMotion(
+        where, issue if line.register is None else _time("register", line.register, issue), command
+    )
+
+
+def _thing(line: _Line, thing: Thing, floor: float | None) -> Thing:
+    _only(line, ("thing", "comment"), "a thing")
+    if floor is None:
+        raise InvalidValueError("thing", thing.name, "below a header with the floor's height [m], as floor: -0.672")
+    return thing
 
 
 def _payload(line: _Line, where: str) -> PlannedPayload:

@@ -36,8 +36,10 @@ from interfaces.runtime.laboratory import Laboratory
 from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.system import software
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
-from robots.robot import ArmBody, Robot, exact_arm
-from vrs import Lateness, Receipt, Status
+from robots.bullet.grasping import grasping
+from robots.bullet.things import Scene
+from robots.robot import ArmBody, Gripper, Robot, exact_arm
+from vrs import Engine, Lateness, Receipt, Status
 from vrs.model import Array
 from vrs.timeline import Timeline
 
@@ -77,6 +79,7 @@ class TwinSession:
         seed: int,
         offset: float | None,
         keeper: RunKeeper | None = None,
+        scene: Scene | None = None,
     ) -> None:
         """Put both twins at rest.
 
@@ -89,10 +92,14 @@ class TwinSession:
             seed: Seed of the link, ≥ 0.
             offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
             keeper: Who writes it down while it goes on.
+            scene: What is around the real robot, which its body has.
         """
         model = robot.arm
-        self._start, self._robot, self._offset, self._body = start, robot, offset, body
-        self.operator = OperatorSite(VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE))
+        self._start, self._robot, self._offset, self._body, self._scene = start, robot, offset, body, scene
+        fingers = None if (gripper := robot.device(Gripper)) is None else gripper.fingers
+        stroke = math.inf if fingers is None else fingers.stroke
+        virtual = VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE, stroke=stroke)
+        self.operator = OperatorSite(virtual)
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
         self._site = FollowingArm(model, start, now=0.0, config=config)
         self.lab = Laboratory(
@@ -148,7 +155,7 @@ class TwinSession:
             lab.run(lab.now + TURN)
             self._take_down()
             progress(lab.now)
-            rest = max(self.last_action, self._handled, self.operator.robot.engine.timeline.end)
+            rest = max(self.last_action, self._handled, _end(self.operator.robot.engine))
             arrived = self._robot_rests() if lab.now >= rest else None
             if arrived is not None and self._agree(arrived):
                 rest = max(rest, arrived)
@@ -187,13 +194,16 @@ class TwinSession:
         none = np.empty((0, len(self._start)))
         reference, real = (np.concatenate([none, *(block[i] for block in blocks)]) for i in (1, 2))
         events, self._told = tuple(self._events[self._told :]), len(self._events)
-        self._keeper.turn(Turn(lab.now, first, play, real, reference, there, back, events, packets))
+        hands, lab.hands = tuple(lab.hands), []
+        self._keeper.turn(
+            Turn(lab.now, first, play, real, reference, there, back, events, packets, hands, self._scene)
+        )
 
     def _robot_rests(self) -> float | None:
         """When the robot had done everything that it was told [s]; None if it hasn't."""
         everything = self._site.halted or (len(self.lab.answers) == len(self._sent) and not self._cues)
         began = self._site.epoch > 0 or self._offset is not None
-        end = self._site.engine.timeline.end - 1e-9
+        end = _end(self._site.engine) - 1e-9
         if not (everything and began) or self._play_at(self.lab.now) < end:
             return None
         return STEP * float(np.searchsorted(self._play(), end))
@@ -287,6 +297,16 @@ class TwinSession:
         return commands_alone(self._robot.arm, self._start, self._sent)
 
 
+def _end(engine: Engine) -> float:
+    """When an engine has done all that it was told [s], its hand too."""
+    return max(engine.timeline.end, engine.scheduler.grips[-1].t)
+
+
+def placed_in(scene: Scene | None, arm: Callable[..., AbstractContextManager[ArmBody]], robot: Robot) -> ArmFactory:
+    """What makes an arm's body where something is around it that it can grasp; where nothing is, as it's given."""
+    return arm if scene is None else grasping(arm, robot, scene)
+
+
 def unheard(t: float) -> None:
     """Report no progress."""
 
@@ -320,10 +340,11 @@ def run_twins(
         The record, every 20 ms of user time, until both robots have been at rest for 2 s.
     """
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
-    with (arm or robot.body())(plan.start) as body:
+    with placed_in(plan.scene, arm or robot.body(), robot)(plan.start) as body:
         session = TwinSession(
-            plan.start, robot, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper
-        )
+            plan.start, robot, conditions, body, title=plan.title, seed=seed, offset=offset, keeper=keeper,
+            scene=plan.scene,
+        )  # fmt: skip
         for motion in plan.motions:
             session.lab.schedule(motion.registered_at, lambda now, motion=motion: _register(session, motion, now))  # type: ignore[misc]
         for item in plan.payloads:
@@ -371,7 +392,7 @@ def run_without(
         profile, offset = ConstantDelay("none", 0.0), 0.0
     free = "payload_and_friction" in causes
     if free:
-        plan = replace(plan, payloads=())
+        plan = replace(plan, payloads=(), scene=None)
     arm = exact_arm if "servo" in causes else partial(robot.body(), friction=not free)
     return run_twins(
         plan, robot, profile, arm, seed=seed, offset=offset, service=service, progress=progress, keeper=keeper
@@ -390,7 +411,7 @@ def offset_outcome(
 ) -> OffsetOutcome:
     """Run a plan for the sake of its offset: see `interfaces.runtime.session.run_twins`."""
     run = run_twins(
-        replace(plan, payloads=()), robot, profile, exact_arm,
+        replace(plan, payloads=(), scene=None), robot, profile, exact_arm,
         seed=seed, offset=offset, service=service, progress=progress,
     )  # fmt: skip
     kinds = [event.kind for event in run.events]

@@ -35,6 +35,7 @@ from interfaces.runtime.physics_messages import (
     Rows,
     TickCounter,
 )
+from robots.bullet.grasping import HandState
 from robots.onboard.following import SensorMonitor
 from robots.onboard.servo import from_measured
 from vrs.errors import FormatError, VrsError
@@ -246,6 +247,16 @@ class TickBody(Protocol):
         """Drop the load."""
 
 
+class TickHand(Protocol):
+    """A body's hand, and the things around it."""
+
+    def grip(self, opening: float) -> None:
+        """Let the fingers go to an opening [m]; infinity opens as far as they go."""
+
+    def state(self) -> HandState:
+        """How they're now."""
+
+
 class _TickState(NamedTuple):
     q: list[float]
     qd: list[float]
@@ -267,6 +278,7 @@ class TickLoop:
         now: float,
         realtime: bool = False,
         prismatic: Collection[int] = (),
+        hand: TickHand | None = None,
     ) -> None:
         """Hold a position.
 
@@ -279,7 +291,9 @@ class TickLoop:
             now: By the robot's clock [s].
             realtime: What to tell the parent of the process's priority.
             prismatic: Joints that are, from 0: [m] for [rad].
+            hand: Of the body; None where there's none.
         """
+        self._hand, self._grips = hand, deque[tuple[int, float]]()
         self._body, self._limits, self._tick, self._every = body, limits, tick, every
         self._speeds, self._changes = (_OVER * limits.qd_max).tolist(), (_TICKS * tick * limits.qdd_max).tolist()
         self._last = math.floor(now / tick + _SAME)
@@ -362,6 +376,8 @@ class TickLoop:
         self._counter.add(late)
         step = self._step(k)
         try:
+            while self._hand is not None and self._grips and self._grips[0][0] <= k - self._lag:
+                self._hand.grip(self._grips.popleft()[1])
             moved = self._body.step(step.prepared)
         except VrsError as problem:
             self._failed = True
@@ -376,7 +392,9 @@ class TickLoop:
         if k % self._every == 0:
             q, qd, tau = map(tuple, self._measured)
             seen, followed = self._measured_tick
-            self._tell(Measurement(seen, self._doing, q, qd, tau, tuple(step.q), followed, self._counter.counts()))
+            hand = None if self._hand is None else self._hand.state()
+            counts = self._counter.counts()
+            self._tell(Measurement(seen, self._doing, q, qd, tau, tuple(step.q), followed, counts, hand))
 
     def _see(self, moved: Moved, k: int) -> None:
         """Take what was measured after a tick, if it's sound; brake where it hasn't been for a while."""
@@ -401,6 +419,9 @@ class TickLoop:
             raise FormatError("rows", "too many blocks")
         while self._ahead and self._ahead[-1][0] >= message.start:
             self._ahead.pop()
+        while self._grips and self._grips[-1][0] >= message.start:
+            self._grips.pop()
+        self._grips.extend(message.grips)
         self._belated = self._belated or message.start <= self._last
         if message.placed:
             self._placing = message.start
@@ -521,6 +542,7 @@ class TickLoop:
         """Begin to brake; return where the references will rest [rad]."""
         self._buffer.clear()
         self._ahead.clear()
+        self._grips.clear()
         self._placing, self._lag, self._belated = None, 0, False
         stop = from_measured(0.0, self._at.q, self._at.qd, self._limits)
         ticks = math.ceil(stop.end / self._tick - _SAME) if stop.end > 0 else 0

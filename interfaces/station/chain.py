@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interfaces.station.panels import Offer
-from robots.robot import Robot
+from robots.robot import Gripper, Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -85,6 +85,10 @@ def described(robot: Robot) -> dict[str, Any]:
     if robot.is_base:
         return {"segments": Offer.ARCS, "name": robot.name}
     home, S = screws(robot.arm)
+    gripper, hand = robot.device(Gripper), None
+    if gripper is not None and gripper.fingers is not None:
+        # The fingers' middles are so far from the middle of the last link, beside half of the opening [m].
+        hand = {"link": len(home) - 1, "x": gripper.point[0], "aside": gripper.fingers.thickness / 2}
     return {
         "segments": Offer.POLYNOMIALS,
         "home": [X.T.ravel().tolist() for X in home],
@@ -93,4 +97,5 @@ def described(robot: Robot) -> dict[str, Any]:
         "joints": list(robot.joints),
         "tool_speed": robot.arm.tool_speed,
         "tool_turn_speed": robot.arm.tool_turn_speed,
+        "hand": hand,
     }

@@ -13,18 +13,21 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
-from typing import Annotated, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 from typing_extensions import override
 
 from interfaces.engine_server.site import engine_time
 from interfaces.link.delivery import Incoming
+from interfaces.messages.control import HandReport
 from interfaces.messages.fields import Epoch
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report
 from interfaces.teleop.connection import Host, HostConfig
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig, RobotSite
 from interfaces.teleop.samples import SampleLog
+from robots.bullet.grasping import HandState
+from robots.bullet.things import ThingPose, has_moved
 from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
 from robots.onboard.servo import from_commanded
@@ -134,7 +137,14 @@ class FollowingArm(RobotSite[Orders, Report]):
     rearms = False
 
     def __init__(
-        self, model: RobotModel, q: Array, *, now: float, config: RobotSiteConfig | None = None, reported: int = 0
+        self,
+        model: RobotModel,
+        q: Array,
+        *,
+        now: float,
+        config: RobotSiteConfig | None = None,
+        reported: int = 0,
+        opening: float = math.inf,
     ) -> None:
         """Stand at rest until the first message comes.
 
@@ -144,12 +154,14 @@ class FollowingArm(RobotSite[Orders, Report]):
             now: By the robot's clock [s].
             config: How to behave.
             reported: Number that no report or sample of an earlier life, which the operator may know, was above.
+            opening: What the hand was told before [m]; infinity: it's open.
         """
         self.config = RobotSiteConfig() if config is None else config
         super().__init__(self.config.watchdog, self.config.beat, now=now, reported=reported)
         self._model = model
         self._clock = ManualClock(now)
         self.engine = Engine(model, q=q)
+        self.engine.begin_with(opening)
         self.violation: Violation | None = None
         """What was measured that stopped it; None where it wasn't that, or since it may move again."""
         self._prismatic = model.prismatic
@@ -165,6 +177,9 @@ class FollowingArm(RobotSite[Orders, Report]):
         self._receipts: deque[tuple[int, int, Receipt]] = deque(maxlen=_TELL_MOST)
         self._measured, self._measured_at = np.array(q, float), (now, self._play_at(now))
         self._samples = SampleLog(len(self._measured), reported)
+        self._hand: HandState | None = None
+        self._moved: dict[int, tuple[int, ThingPose]] = {}
+        """Of each thing that moves, the number of the report in which it was told to have moved, and where to."""
 
     @property
     def playout(self) -> Playout | None:
@@ -181,7 +196,7 @@ class FollowingArm(RobotSite[Orders, Report]):
         """Meet an operator whose timeline isn't known here: as after a stop by itself, in the operator's epoch."""
         super().join(orders, reason, now=now)
         fixed = self.config.fixed_offset
-        self.engine = Engine(self._model, timeline=Timeline(self._measured, orders.sent_at))
+        self._renew(now, timeline=Timeline(self._measured, orders.sent_at))
         # The next epoch begins after that by the operator's own clock, perhaps before now by what is known of it.
         self._play = EvenPlay(0.0, end=orders.sent_at) if fixed is None else EvenPlay(fixed)
         self._plays = deque([(now, self._play)], maxlen=_PLAYS)
@@ -226,9 +241,9 @@ class FollowingArm(RobotSite[Orders, Report]):
         began = max(began, self._play_at(now))
         self._clock = ManualClock(began)
         if len(stood):
-            self.engine = Engine(self._model, timeline=stood, clock=self._clock)
+            self._renew(now, timeline=stood, clock=self._clock)
         else:
-            self.engine = Engine(self._model, q=stood.initial, clock=self._clock)
+            self._renew(now, q=stood.initial, clock=self._clock)
         self.violation, self.parted = None, False
         self._log, self._messages = ReceivedLog(began), 0
         self._offset = AdaptiveOffset(self.config.offset)
@@ -239,6 +254,12 @@ class FollowingArm(RobotSite[Orders, Report]):
             else EvenPlay(fixed)
         )
         self._plays.append((now, self._play))
+
+    def _renew(self, now: float, **start: Any) -> None:
+        """Begin with another engine, the hand as it has been told by now [s]."""
+        told = float(self.engine.opening(self._play_at(now)))
+        self.engine = Engine(self._model, **start)
+        self.engine.begin_with(told)
 
     def _carry_out(self, entry: LogEntry, now: float) -> None:
         at = entry.at if isinstance(self._play, Playout) else engine_time(self._play_at(now), 0.0)
@@ -302,6 +323,18 @@ class FollowingArm(RobotSite[Orders, Report]):
         q, qd, qdd = (self.engine.timeline.sample(p, derivative=k) for k in range(3))
         return JointReference(q, qd * pace, qdd * pace * pace + qd * rate)
 
+    def openings(self, play: PlayState) -> Array:
+        """What the hand is told where play is [m], (k,); infinity for as far open as it goes."""
+        return self.engine.opening(play.p)
+
+    def hand(self, state: HandState) -> None:
+        """Take in how the hand and the things around it were measured."""
+        self._hand = state
+        for k, pose in enumerate(state.poses):
+            known = self._moved.get(k)
+            if has_moved(known and known[1], pose):
+                self._moved[k] = self._reports + 1, pose
+
     def measured(self, q: Array, *, now: float, at: float | None = None) -> bool:
         """Take in measured joints; where one is too far from its reference, the robot stops.
 
@@ -356,7 +389,7 @@ class FollowingArm(RobotSite[Orders, Report]):
             state = State(*(row[0] for row in self.reference(play)))
             timeline = timeline.edited(p, [piece(stop(state, Profile.PARABOLIC, limits)[0], HOLD)])
         self._clock = ManualClock(p)
-        self.engine = Engine(self._model, timeline=timeline, clock=self._clock)
+        self._renew(now, timeline=timeline, clock=self._clock)
         # What the next epoch puts after this end isn't played before that begins.
         self._play = EvenPlay(p - now, end=timeline.end)
         self._plays.append((now, self._play))
@@ -377,8 +410,21 @@ class FollowingArm(RobotSite[Orders, Report]):
             cast("Epoch", self.epoch), self._reports, now, self._log.executed, float(p[0]), float(pace[0]), q,
             *self._measured_at, self._newest, self.halted, self._told(), plan,
             self.engine.timeline.sample(self._measured_at[1]), self._uncertainty, self._samples.take(),
-            self._samples.oldest,
+            self._samples.oldest, self._hand_report(),
         )  # fmt: skip
+
+    def _hand_report(self) -> HandReport | None:
+        """The hand, and the things that have moved in the reports just before; now and then all of them."""
+        hand = self._hand
+        if hand is None:
+            return None
+        all_of_them = self._reports % _AGAIN == 0
+        things = tuple(
+            (k, pose)
+            for k, pose in enumerate(hand.poses)
+            if all_of_them or self._moved[k][0] > self._reports - _REPEAT
+        )
+        return HandReport(hand.opening, hand.goal, hand.holds, things)
 
     def _told(self) -> tuple[tuple[int, Receipt], ...]:
         """Receipts for a report: new ones, those of the reports just before, and now and then the oldest."""
@@ -439,17 +485,34 @@ class RobotHost(Host[FollowingArm, Orders, Report]):
         self.config = RobotHostConfig() if config is None else config
         super().__init__(self._site_from, self.config, now=now, seed=seed)
         self._model = model
-        self._q = np.array(q, float)
+        self._q, self._opening = np.array(q, float), math.inf
+        self._hand: HandState | None = None
 
     def _site_from(self, t: float) -> FollowingArm:
         site = replace(self.config.site, watchdog=self.watchdog(self.config.site.watchdog))
         config = replace(self.config, site=site).decided()
         reported = max(0, math.floor(1000.0 * t))
-        return FollowingArm(self._model, self._q, now=t, config=config, reported=reported)
+        made = FollowingArm(self._model, self._q, now=t, config=config, reported=reported, opening=self._opening)
+        if self._hand is not None:
+            made.hand(self._hand)
+        return made
 
     @override
     def _left(self, now: float) -> None:
         self._q = self.reference(np.array([now])).q[0]
+        self._opening = float(self.openings(np.array([now]))[0])
+
+    def openings(self, t: Array) -> Array:
+        """What the hand is told at ascending times of the robot's clock [s] if no more is heard [m], (k,)."""
+        if self.site is None:
+            return np.full(len(t), self._opening)
+        return self.site.openings(self.site.foreseen(np.asarray(t, float) + self.offset))
+
+    def hand(self, state: HandState) -> None:
+        """Take in how the hand and the things around it were measured."""
+        self._hand = state
+        if self.site is not None:
+            self.site.hand(state)
 
     def reference(self, t: Array) -> JointReference:
         """What the body is to do, (k, n) each, at ascending times of the robot's clock [s] if no more is heard."""

@@ -105,6 +105,9 @@ class SiteObserver(Protocol[R_contra, T_contra]):
     def measured(self, samples: Sequence[Sample], *, now: float) -> None:
         """Samples of the robot have come that weren't known: mostly the newest, some of them late."""
 
+    def grasped(self, report: Any, *, now: float) -> None:
+        """A report has come with a newer state of an arm's hand and of the things around it."""
+
     def failed(self, error: Exception) -> None:
         """Being told raised this: nothing more is told."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,6 +14,7 @@ from typing_extensions import override
 
 from interfaces.link.delivery import Outgoing
 from interfaces.messages import Refusal
+from interfaces.messages.control import HandReport
 from interfaces.messages.recording import CommandRecord
 from interfaces.messages.requests import check_crosses
 from interfaces.messages.sites import LogEntry, Orders, PlanPart, Report, Sample
@@ -28,12 +30,14 @@ from interfaces.teleop.operator import (
     text_of,
 )
 from interfaces.teleop.samples import Gathering
+from robots.bullet.things import ThingPose
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import (
     Alter,
     Cancel,
     Command,
+    Grip,
     InsertVia,
     JointTarget,
     Lateness,
@@ -123,7 +127,7 @@ def resolved(command: Command, answer: Receipt, now: float) -> Command:
         return replace(command, issued_at=issued, execute_at=max(now, command.execute_at or now))
     if isinstance(command, SteerCommand):
         return replace(command, issued_at=issued, execute_at=max(now, issued, command.execute_at or now))
-    if isinstance(command, (ScaleTime, Stop, Resume)):
+    if isinstance(command, (ScaleTime, Stop, Resume, Grip)):
         return replace(command, issued_at=issued, execute_at=answer.execute_at)
     if isinstance(command, (Retime, Cancel, InsertVia)):
         return replace(command, issued_at=issued)
@@ -171,6 +175,7 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         now: float,
         config: OperatorSiteConfig | None = None,
         lateness: Lateness = Lateness.POSTPONE,
+        stroke: float = math.inf,
     ) -> None:
         """Start at rest at q.
 
@@ -180,7 +185,16 @@ class VirtualArm(VirtualRobot[Orders, Report]):
             now: By the operator's clock [s].
             config: How to send.
             lateness: What happens to commands whose execution time has passed.
+            stroke: How far the hand opens [m].
         """
+        self._stroke = stroke
+        self.hand: HandReport | None = None
+        """The real hand as it was told of last; None where it's in no scene."""
+        self.hand_at = -math.inf
+        """The time on the robot's timeline that it played then [s]."""
+        self._hand_number = 0
+        self.things: dict[int, ThingPose] = {}
+        """Where things were measured last, by number."""
         self.config = OperatorSiteConfig() if config is None else config
         self._model, self._lateness = model, lateness
         self.clock = ManualClock(now)
@@ -311,6 +325,10 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         found = self.gathering.take(report.samples if report.oldest else (alone,), report.oldest, now=now)
         if found:
             site.inform(lambda listener: listener.measured(found, now=now))
+        if report.hand is not None and report.number > self._hand_number:
+            self.hand, self.hand_at, self._hand_number = report.hand, report.q_at, report.number
+            self.things.update(report.hand.things)
+            site.inform(lambda listener: listener.grasped(report, now=now))
         if report.epoch != site.epoch:
             self._watch_begin(report, now)
             return False
@@ -432,6 +450,9 @@ class VirtualArm(VirtualRobot[Orders, Report]):
         self._began, self.log, self.newest_sent, self._due = now, Outgoing(), 0, now
         self.command_ids.clear()
         self._waits = self._of_earlier = None
+        # The real hand keeps what it holds: the virtual one is as it is.
+        if report.hand is not None and min(float(self.engine.opening(now)), self._stroke) != report.hand.goal:
+            self.execute(Grip(report.hand.goal), now=now)
         return ""
 
 

@@ -581,6 +581,8 @@ def _grasp(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
     def grasping(opening: float) -> Generator[float, None, int]:
         yield from _standing(c, lambda: c.arm.actuate(False, now=c.now), None)
+        while not c.arm.felt(now=c.now):
+            yield c.now + SLICE
         if c.arm.here(now=c.now).hand >= opening:
             return n + 1
         if label is None:

@@ -130,7 +130,9 @@ def served_room(client: LocalClient, site: OperatorSite[VirtualArm], directory: 
         directory: Of LOAD and STORE.
         version: Name and version of the program.
     """
-    robot = SiteRobot(site, lambda command, _now: client.execute(command), fault_poll_interval=FAULT_POLL)
+    robot = SiteRobot(
+        site, lambda command, _now: client.execute(command), fault_poll_interval=FAULT_POLL, has_fingers=True
+    )
     arm = Arm(robot)
     controller = Controller(arm, parameters=arm.parameters, now=client.now())
     shared = SharedController(controller, ServedControl(client))

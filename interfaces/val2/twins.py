@@ -11,15 +11,16 @@ from typing import Final
 from interfaces.link import Conditions, DelayProfile, LinkConditions, Service
 from interfaces.runs.twin_run import QUANTILE, RunKeeper, TwinRun
 from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
-from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, unheard
+from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, placed_in, unheard
 from interfaces.val2.corrections import Corrections
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot
 from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
+from robots.bullet.things import Scene
 from robots.robot import Robot
-from vrs.commands import Command, MotionCommand, PlanEdit, SteerCommand
+from vrs.commands import Command, Grip, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt, Status
 from vrs.model import home
 
@@ -62,7 +63,7 @@ class _Operator:
         answer = virtual.execute(command, now=now)
         assert isinstance(answer, Receipt)
         if answer.status is not Status.REJECTED:
-            assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit))
+            assert isinstance(command, (MotionCommand, SteerCommand, PlanEdit, Grip))
             self.session.sent(now, command, answer)
             self.motions.append(PlannedMotion(self.name, now, command))
         return answer
@@ -97,6 +98,7 @@ def play(
     seed: int,
     offset: float | None = None,
     service: Service = Service.DATAGRAM,
+    scene: Scene | None = None,
     listeners: Listeners | None = None,
     limit: float = LONGEST,
     files: Path | None = None,
@@ -114,6 +116,7 @@ def play(
         seed: Seed of the link and of RANDOM, ≥ 0.
         offset: A fixed D = −D_f [s], ≤ 0; None adapts it to the network.
         service: Order of delivery on the link.
+        scene: What the real robot can grasp; nothing unless given, and then its fingers aren't modelled.
         listeners: Who hears what the program says; nobody by default.
         limit: When the program is given up [s].
         files: The directory of the program's files; it has none unless given.
@@ -126,12 +129,12 @@ def play(
     """
     start = home(robot.arm)
     conditions = LinkConditions.symmetric(Conditions(delay=profile, service=service))
-    with (arm or robot.body())(start) as body:
+    with placed_in(scene, arm or robot.body(), robot)(start) as body:
         session = TwinSession(
-            start, robot, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper
+            start, robot, conditions, body, title=source.name, seed=seed, offset=offset, keeper=keeper, scene=scene
         )
         operator = _Operator(session, limit, source.name)
-        site = SiteRobot(session.operator, operator.execute)
+        site = SiteRobot(session.operator, operator.execute, has_fingers=scene is not None)
         val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
         operator.player = player = Player(
@@ -142,5 +145,5 @@ def play(
         session.lab.schedule(0.0, operator.advance)
         end = session.run(PATIENCE + 4 * profile.quantile(QUANTILE), progress or unheard)
     run = session.record(end)
-    plan = RunPlan(source.name, start, tuple(operator.motions), tuple(operator.payloads))
+    plan = RunPlan(source.name, start, tuple(operator.motions), tuple(operator.payloads), scene)
     return Played(run, plan, player.errors[-1] if player.errors else None)

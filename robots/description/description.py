@@ -108,6 +108,8 @@ class Description:
     """Nominal angular speed of the tool [rad/s]; None where nothing is said."""
     point: tuple[float, float, float] | None = None
     """Where a gripper holds, in the tip's frame [m]; None where nothing is said."""
+    gravity: float = 9.81
+    """Free fall along -z of the root [m/s²]."""
     notes: tuple[str, ...] = ()
     """What was missing or can't be, what was assumed for it, and how it's stated; a sentence each."""
 

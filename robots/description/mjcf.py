@@ -64,7 +64,7 @@ class _Compiled:
     def __init__(self, model: Any, path: Path) -> None:
         import mujoco
 
-        self._m, self._path = model, path
+        self._mujoco, self._m, self._path = mujoco, model, path
         self._hinge, self._slide = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
         self._geom = mujoco.mjtGeom
         self._count: dict[str, list[str]] = defaultdict(list)
@@ -81,7 +81,9 @@ class _Compiled:
             self._add(body)
         notes = tuple(what.replace("{}", ", ".join(of)) for what, of in self._count.items())
         names = self._m.names[: self._m.names.index(b"\0")].decode()
-        return Description(names, self._links, tuple(self._joints), self._keyframes(), notes=notes)
+        weightless = self._m.opt.disableflags & int(self._mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        gravity = 0.0 if weightless else min(max(-float(self._m.opt.gravity[2]), 0.0), 100.0)
+        return Description(names, self._links, tuple(self._joints), self._keyframes(), gravity=gravity, notes=notes)
 
     def _name(self, kind: str, k: int) -> str:
         return str(getattr(self._m, kind)(k).name) or f"{kind}_{k}"

@@ -26,6 +26,7 @@ from interfaces.runtime.live.physics_body import PhysicsBody
 from interfaces.runtime.live.robot import LiveRobot
 from interfaces.runtime.live.robot_server import LARGEST
 from interfaces.runtime.physics import PhysicsConfig
+from interfaces.runtime.physics_messages import Grips
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
 from interfaces.stream.server import application
@@ -52,12 +53,12 @@ class Rows:
         assert physics is not None
         feed = physics.feed
 
-        def noted(rows: JointReference, first: int, *, placed: bool = False) -> bool:
+        def noted(rows: JointReference, first: int, *, placed: bool = False, grips: Grips = ()) -> bool:
             for tick in [tick for tick in self.q if tick >= first]:
                 del self.q[tick]
             for k in range(len(rows.q)):
                 self.q[first + k] = np.concatenate([rows.q[k], rows.qd[k]])
-            return feed(rows, first, placed=placed)
+            return feed(rows, first, placed=placed, grips=grips)
 
         physics.feed = noted  # type: ignore[method-assign]
 

@@ -9,7 +9,7 @@ from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.control import Pong
 from interfaces.messages.sites import Orders
 from interfaces.runtime.physics import Feeder
-from interfaces.runtime.physics_messages import Fault, Measurement, News, Rows
+from interfaces.runtime.physics_messages import Fault, Grips, Measurement, News, Rows
 from interfaces.runtime.physics_process import BodyTicks
 from interfaces.runtime.tick_loop import TickLoop
 from interfaces.teleop import JointReference, OperatorSite, RobotHost, RobotHostConfig, RobotLine, VirtualArm
@@ -39,7 +39,14 @@ class Site:
         self.told: list[Rows] = []
         self.news: list[News] = []
 
-    def feed(self, reference: JointReference, start: int, *, placed: bool = False) -> bool:
+    def feed(
+        self,
+        reference: JointReference,
+        start: int,
+        *,
+        placed: bool = False,
+        grips: Grips = (),
+    ) -> bool:
         self.told.append(Rows(0, start, placed, np.stack(reference, axis=1).tobytes()))
         return True
 

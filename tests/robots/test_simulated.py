@@ -57,7 +57,7 @@ def test_the_worlds_dynamics_are_those_of_the_chain(world: str, n: int) -> None:
     np.testing.assert_allclose(
         links.inverse_dynamics(q[4:5], qd[4:5], qdd[4:5], gravity=9.81)[0], tau[4], rtol=1e-12
     )
-    with chain_arm(world, links, limits(n), np.zeros(n), friction=False) as arm:
+    with chain_arm(world, links, limits(n), 9.81, np.zeros(n), friction=False) as arm:
         for row in zip(q, qd, qdd, tau, strict=True):
             arm.place(row[0], row[1])
             arm.apply(row[3])
@@ -94,16 +94,16 @@ DRIVES = {"armature": 0.05, "viscous": 0.2, "coulomb": (0.3, -0.2)}
 @pytest.mark.parametrize("world", WORLDS)
 def test_an_arm_of_seven_joints_follows_and_the_worlds_agree(world: str) -> None:
     links, references = chain(7, 7, **DRIVES), swing(7, 2.0)
-    with chain_arm(world, links, limits(7), np.zeros(7)) as arm:
+    with chain_arm(world, links, limits(7), 9.81, np.zeros(7)) as arm:
         whole = arm.follow(arm.prepare(*references))
     assert np.degrees(np.sqrt(np.mean((whole.q - references[0]) ** 2, axis=0))).max() < 0.5
     assert not whole.saturated.any()
-    with chain_arm(world, links, limits(7), np.zeros(7)) as arm:
+    with chain_arm(world, links, limits(7), 9.81, np.zeros(7)) as arm:
         parts = [
             arm.follow(arm.prepare(*(row[a:b] for row in references))) for a, b in ((0, 1), (1, 700), (700, 2000))
         ]
     np.testing.assert_array_equal(np.concatenate([part.q for part in parts]), whole.q)
-    with chain_arm("bullet", links, limits(7), np.zeros(7)) as arm:
+    with chain_arm("bullet", links, limits(7), 9.81, np.zeros(7)) as arm:
         np.testing.assert_allclose(arm.follow(arm.prepare(*references)).q, whole.q, rtol=0, atol=1e-9)
 
 
@@ -111,7 +111,7 @@ def test_an_arm_of_seven_joints_follows_and_the_worlds_agree(world: str) -> None
 def test_coulomb_friction_holds_a_joint_that_is_pushed_too_little(world: str) -> None:
     links = chain(2, 1, coulomb=(5.0, -5.0))
     level = links.inverse_dynamics(*np.zeros((3, 1, 1)), gravity=9.81)[0]
-    with chain_arm(world, links, limits(1), [0.0]) as arm:
+    with chain_arm(world, links, limits(1), 9.81, [0.0]) as arm:
         for push, moves in ((4.9, False), (5.2, True)):
             for _ in range(50):
                 arm.apply(level + push)
@@ -129,7 +129,7 @@ def test_a_load_hangs_at_the_flange_and_efforts_end_at_their_limit(world: str) -
     added = held.inverse_dynamics(*rest, gravity=9.81) - links.inverse_dynamics(*rest, gravity=9.81)
     np.testing.assert_allclose(added[0], 2.0 * 9.81 * np.array(rise), atol=1e-8)
     zero, rows = np.zeros(3), np.zeros((300, 3))
-    with chain_arm(world, links, limits(3), zero) as arm:
+    with chain_arm(world, links, limits(3), 9.81, zero) as arm:
         arm.follow(arm.prepare(rows, rows, rows))
         assert np.abs(arm.q).max() < 1e-9
         arm.attach(2.0)
@@ -137,7 +137,7 @@ def test_a_load_hangs_at_the_flange_and_efforts_end_at_their_limit(world: str) -
         assert np.abs(sunk).max() > 1e-4
         arm.release()
         assert np.abs(arm.follow(arm.prepare(rows, rows, rows)).q[-1]).max() < 0.2 * np.abs(sunk).max()
-    with chain_arm(world, chain(3, 3, effort=2.0), limits(3), zero) as arm:
+    with chain_arm(world, chain(3, 3, effort=2.0), limits(3), 9.81, zero) as arm:
         measured = arm.follow(arm.prepare(rows, rows, rows))
         assert np.abs(measured.tau).max() == 2.0
         assert measured.saturated.max() > 100

@@ -37,6 +37,7 @@ from interfaces.teleop import OperatorSiteConfig
 from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
 from robots.bullet.rooms import EMPTY, Room
+from robots.bullet.things import Scene
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
@@ -125,7 +126,7 @@ class LiveOperator(LeasedRobot, Workers):
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self.recording = SiteRecording(
-            config.recording, self.line, self.clock, lambda: self.robot.connected, seed=config.seed
+            config.recording, self.line, self.clock, lambda: self.robot.connected, self._around, seed=config.seed
         )
         """What is recorded here."""
         self.desk: TaskDesk | None = None
@@ -141,6 +142,11 @@ class LiveOperator(LeasedRobot, Workers):
         """Since when a lease is ending [s]; None while none is."""
         self._told: Hashable = (False, "", twins.news)
         self._states = 0
+
+    def _around(self) -> Scene | None:
+        """What is around an arm; None while nothing is known that it could grasp."""
+        attached = self.robot.attached
+        return None if attached is None else attached.scene
 
     @property
     def routes(self) -> list[BaseRoute]:

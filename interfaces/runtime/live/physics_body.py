@@ -42,7 +42,7 @@ class PhysicsBody(LiveBody):
         self.name, self.offset, self.watchdog = physics.robot.name, host.site.fixed_offset, host.site.watchdog
         self.clock = WallClock()
         self.host = RobotHost(model, physics.q, now=self.clock.now(), config=host, seed=secrets.randbelow(2**32))
-        self._config = physics
+        self._config, self.scene = physics, physics.scene
         self.physics: PhysicsProcess | None = None
         """The body's own process; None without one."""
         self._feeder: Feeder | None = None
@@ -60,7 +60,10 @@ class PhysicsBody(LiveBody):
     async def running(self, soon: Callable[[], None]) -> AsyncIterator[None]:
         loop = asyncio.get_running_loop()
         with PhysicsProcess(self._config, self.clock) as physics:
-            self.physics, self._feeder = physics, Feeder(self.host, physics, now=self.clock.now())
+            self.physics, self._feeder = (
+                physics,
+                Feeder(self.host, physics, now=self.clock.now(), grasps=self.scene is not None),
+            )
             loop.add_reader(physics.fileno(), soon)
             try:
                 yield
@@ -91,6 +94,8 @@ class PhysicsBody(LiveBody):
         """Take in what the body's process said."""
         if isinstance(event, Measurement):
             self._measured, self.ready = event, True
+            if event.hand is not None:
+                self.host.hand(event.hand)
             if self.host.measured(np.array(event.q), at=event.followed * TICK, now=now):
                 feeder.placed(now=now)
             return
@@ -119,6 +124,7 @@ class PhysicsBody(LiveBody):
             "q_ref": reference.q[0].tolist(),
             "qd_ref": reference.qd[0].tolist(),
             "rests": not (reference.qd.any() or reference.qdd.any()),
+            **({} if measured is None or measured.hand is None else {"hand": measured.hand.opening}),
             "faults": self.faults,
             "ticks": None if counts is None else {
                 "run": counts.ticks, "late": counts.late, "worst": counts.worst, "skipped": counts.skipped,

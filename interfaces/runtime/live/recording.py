@@ -13,6 +13,7 @@ from interfaces.recording.live import TURN, LiveRecorder, LiveRecording
 from interfaces.recording.mcap_file import RecordingError
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.teleop.connection import SiteLine
+from robots.bullet.things import Scene
 from vrs.clock import Clock, seconds_since_1970
 from vrs.errors import InvalidValueError
 
@@ -28,6 +29,7 @@ class SiteRecording(OperatorDevice):
         line: SiteLine[Any, Any, Any],
         clock: Clock,
         connected: Callable[[], bool],
+        around: Callable[[], Scene | None],
         *,
         seed: int,
     ) -> None:
@@ -38,12 +40,14 @@ class SiteRecording(OperatorDevice):
             line: From the operator's site to the robot.
             clock: Session time.
             connected: Whether the robot is heard of.
+            around: What is around an arm; None where nothing is known that it could grasp.
             seed: Of the emulated link.
 
         Raises:
             RecordingError: If the file can't be made.
         """
-        self._line, self._clock, self._connected, self._seed = line, clock, connected, seed
+        self._line, self._clock, self._seed = line, clock, seed
+        self._connected, self._around = connected, around
         self.recorder: LiveRecorder | None = None
         """Of what is recorded now; None while nothing is."""
         self._task: asyncio.Task[None] | None = None
@@ -111,6 +115,7 @@ class SiteRecording(OperatorDevice):
         """Let what has happened be recorded."""
         while True:
             await asyncio.sleep(TURN)
+            recorder.furnish(self._around())
             recorder.advance(now=self._clock.now(), connected=self._connected())
 
     def rerouted(self, now: float, text: str) -> None:

@@ -20,6 +20,7 @@ from interfaces.stream.access import Access, bearer
 from interfaces.stream.codec import Value
 from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
+from robots.bullet.things import Scene
 from robots.onboard.watchdog import WatchdogConfig
 from vrs.clock import WallClock
 from vrs.model import Array
@@ -43,6 +44,8 @@ class LiveBody(ABC):
     """What else an operator's site is told when it's met, and `/health` says."""
     estimates = False
     """Of a mobile robot, see `Attached.estimates`."""
+    scene: Scene | None = None
+    """What is around an arm; None for nothing that it could grasp."""
     offset: float | None = None
     """The robot's timeline less session time [s]; None: it adapts."""
     watchdog: WatchdogConfig | None
@@ -158,7 +161,7 @@ class LiveRobot:
         loss, timeout, age = ("hold", 0.5, None) if dog is None else ("halt", dog.timeout, dog.max_age)
         return Attached(
             PROTOCOL, body.name, body.q, loss, timeout, body.offset, self.instance, self._program, max_age=age,
-            estimates=body.estimates, **body.about,
+            estimates=body.estimates, scene=body.scene, **body.about,
         )  # fmt: skip
 
     def health(self) -> dict[str, Any]:

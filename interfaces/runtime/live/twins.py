@@ -20,7 +20,8 @@ from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine, VirtualArm
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.operator import Halt, HaltCause, VirtualRobot, text_of
-from robots.robot import Robot
+from interfaces.teleop.predicted_grasp import Hands, PredictedGrasp
+from robots.robot import Gripper, Robot
 from vrs.model import Array, home
 
 TOLD_AGAIN = 0.2
@@ -117,7 +118,12 @@ class ArmTwins(LiveTwins[VirtualArm]):
         model = robot.arm
         q = home(model) if q is None else q
         warm(model, q)
-        virtual = VirtualArm(model, q, now=0.0, config=config)
+        gripper = robot.device(Gripper)
+        fingers = None if gripper is None else gripper.fingers
+        stroke = math.inf if fingers is None else fingers.stroke
+        virtual = VirtualArm(model, q, now=0.0, config=config, stroke=stroke)
+        self._fingers = fingers
+        self._grasp = None if gripper is None or fingers is None else PredictedGrasp(gripper)
         self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
         self.line: RobotLine = RobotLine(self.operator, conditions, np.random.default_rng(seed))
         self.site = Site(virtual.engine)
@@ -153,6 +159,7 @@ class ArmTwins(LiveTwins[VirtualArm]):
             round_trip=operator.round_trip,
             messages=self.line.messages()[-MOST_MESSAGES:],
             late=tuple((one.t, one.q) for one in virtual.gathering.late(since=now - TOLD_AGAIN)),
+            hand=report.hand,
         )
 
     @override
@@ -164,7 +171,23 @@ class ArmTwins(LiveTwins[VirtualArm]):
         if report is not None and not operator.halted:
             path = Committed(operator.robot.engine.timeline, report.q_at)
         real = None if report is None else report.q
-        self.scene.show(virtual=operator.robot.shown(now=now), real=real, path=path, now=now)
+        if attached is not None and attached.scene is not None and self._grasp is not None:
+            if attached.scene != self._grasp.scene:
+                self._grasp.scene = attached.scene
+            self.scene.furnish(attached.scene)
+        q = operator.robot.shown(now=now)
+        self.scene.show(virtual=q, real=real, path=path, hands=self._hands(q, now), now=now)
+
+    def _hands(self, q: Array, now: float) -> Hands | None:
+        """Both hands: the virtual one as it's told, the real one as it's measured, else as it's told."""
+        virtual, report = self.operator.robot, self.operator.report
+        if self._grasp is None or self._fingers is None:
+            return None
+        goals = virtual.engine.scheduler.grips
+        X = virtual.engine.model.forward(q)
+        opening, predicted = self._grasp.advance(X, goals, virtual.things, now=now)
+        real = None if report is None else self._fingers.opening(goals, report.q_at)
+        return Hands(opening, real if virtual.hand is None else virtual.hand.opening, virtual.things, predicted)
 
     @override
     def freed(self) -> None:

@@ -8,15 +8,26 @@ const LASTS = 1;
 export class History {
   constructor(station) {
     this.rows = [];
+    /** How the hand was, and where things: {t, opening, things by number}. */
+    this.hands = [];
     let run = null;
     station.on("welcome", ({ instance }) => {
       if (instance !== run) this.rows = [];
+      if (instance !== run) this.hands = [];
       run = instance;
     });
-    station.on("state", ({ t, q, late }) => {
+    station.on("state", ({ t, q, late, hand }) => {
       for (const [then, joints] of [...late, [t, q]]) this.put(then, joints);
-      if (this.rows.length > KEPT + 1000) this.rows.splice(0, 1000);
+      if (hand) this.feel(t, hand);
+      for (const rows of [this.rows, this.hands]) if (rows.length > KEPT + 1000) rows.splice(0, 1000);
     });
+  }
+
+  /** Take how the hand was measured, and where things were that had moved. */
+  feel(t, { opening, things }) {
+    const last = this.hands.at(-1) ?? { t: -Infinity, things: new Map() };
+    if (t <= last.t) return;
+    this.hands.push({ t, opening, things: things.length ? new Map([...last.things, ...things]) : last.things });
   }
 
   /** Take a measurement to its place; what came late may come twice. */
@@ -26,11 +37,11 @@ export class History {
   }
 
   /** How many measurements aren't later than t [s]. */
-  after(t) {
-    let [low, high] = [0, this.rows.length];
+  after(t, rows = this.rows) {
+    let [low, high] = [0, rows.length];
     while (low < high) {
       const middle = (low + high) >> 1;
-      if (this.rows[middle].t <= t) low = middle + 1;
+      if (rows[middle].t <= t) low = middle + 1;
       else high = middle;
     }
     return low;
@@ -40,5 +51,10 @@ export class History {
   at(t) {
     const row = this.rows[this.after(t) - 1];
     return row && t - row.t <= LASTS ? row.q : null;
+  }
+
+  /** The hand and the things before t [s], at first as they were known first; null where none are known. */
+  grasp(t) {
+    return this.hands[Math.max(this.after(t, this.hands) - 1, 0)] ?? null;
   }
 }

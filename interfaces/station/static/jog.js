@@ -1,4 +1,5 @@
 // Jogging: joints and tool by buttons, keys, sliders and typed numbers, by the stick and by a gamepad; poses.
+import { Hand } from "./hand.js";
 import { Held, letGo, Needs, SpeedRow } from "./handling.js";
 import { POSE } from "./jogging.js";
 import { Pad } from "./pad.js";
@@ -69,6 +70,7 @@ export function Panel({ station }) {
         choose=${(step) => (jog.step = Number(step))} /><//>
     <${Joints} station=${station} dof=${dof} go=${goTyped} />
     <${Tool} station=${station} go=${goTyped} />
+    ${station.config.robot.hand ? html`<${Hand} station=${station} />` : ""}
     <${Poses} station=${station} />`;
 }
 

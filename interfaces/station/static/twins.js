@@ -50,6 +50,15 @@ export class StationScene extends window.VrsScene {
         this.kept.set(path + " ", { type: "set_transform", path, matrix: object.matrix.toArray() });
       }
     }
+    for (const path of this.handled()) {
+      const { object } = this.viewer.scene_tree.find(path);
+      object.updateMatrix();
+      const name = "/" + path.join("/");
+      this.kept.set(name + " ", { type: "set_transform", path: name, matrix: object.matrix.toArray() });
+      if (path[1] !== "predicted") continue;
+      this.kept.set(name + " visible", { type: "set_property", path: name, property: "visible", value: object.visible });
+      object.visible = false;
+    }
     for (const part of ["real", "committed"]) {
       const path = `/${ROOT}/${part}`;
       const value = this.node(ROOT, part).visible;
@@ -68,6 +77,35 @@ export class StationScene extends window.VrsScene {
     this.viewer.set_dirty();
   }
 
+  /** Paths of the real hand's parts, of the things, and of what the virtual hand has taken along. */
+  handled() {
+    const below = (...path) => {
+      let node = this.viewer.scene_tree;
+      for (const name of path) node = node?.children[name];
+      return Object.keys(node?.children ?? {}).filter((name) => /^\d+$/.test(name)).map((name) => [...path, name]);
+    };
+    const links = below(ROOT, "real", "body");
+    return [...links.flatMap((path) => below(...path, "hand")), ...below(ROOT, "things"), ...below(ROOT, "predicted")];
+  }
+
+  /**
+   * Show the real hand and the things as they were.
+   * @param {{opening: number, things: Map<number, number[]>} | null} was null leaves them
+   * @param {{link: number, x: number, aside: number} | null} hand where the fingers are
+   */
+  grasp(was, hand) {
+    if (!was || !hand) return;
+    for (const [finger, side] of [["1", 1], ["2", -1]]) {
+      const node = this.viewer.scene_tree.find([ROOT, "real", "body", String(hand.link), "hand", finger]);
+      node.object.updateMatrix();
+      const matrix = node.object.matrix.toArray();
+      matrix[12] = hand.x + side * (was.opening / 2 + hand.aside);
+      node.set_transform(matrix);
+    }
+    for (const [k, pose] of was.things) this.viewer.scene_tree.find([ROOT, "things", String(k)]).set_transform(matrixOf(pose));
+    this.viewer.set_dirty();
+  }
+
   /** Show a robot with its links at poses; null hides it. */
   pose(twin, poses) {
     this.node(ROOT, twin).visible = poses !== null;
@@ -77,10 +115,22 @@ export class StationScene extends window.VrsScene {
   }
 }
 
-/** Whether a command places a robot, or shows or hides one or its path. */
+/** A pose of x, y, z and a quaternion x, y, z, w as a matrix, by columns. */
+function matrixOf([x, y, z, i, j, k, w]) {
+  return [
+    1 - 2 * (j * j + k * k), 2 * (i * j + w * k), 2 * (i * k - w * j), 0,
+    2 * (i * j - w * k), 1 - 2 * (i * i + k * k), 2 * (j * k + w * i), 0,
+    2 * (i * k + w * j), 2 * (j * k - w * i), 1 - 2 * (i * i + j * j), 0, x, y, z, 1,
+  ];
+}
+
+/** Whether a command places a robot, its hand or a thing, or shows or hides one or its path. */
 function placed({ type, path, property }) {
   const parts = path.split("/").filter(Boolean);
   if (parts[0] !== ROOT) return false;
-  if (type === "set_transform") return parts.length === 4 && parts[2] === "body";
-  return type === "set_property" && property === "visible" && parts.length === 2;
+  if (type === "set_transform") {
+    const real = parts[1] === "real" && parts[4] === "hand";
+    return (parts.length === 4 && parts[2] === "body") || real || parts[1] === "things" || parts[1] === "predicted";
+  }
+  return type === "set_property" && property === "visible" && (parts.length === 2 || parts[1] === "predicted");
 }

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from interfaces.stream.meshcat.committed import Committed, CommittedPath, CommittedPiece
+from interfaces.stream.meshcat.hands import DrawnHands
 from interfaces.stream.meshcat.meshes import Bodies, rod_of
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.stream.meshcat.room import DrawnRoom
-from robots.robot import Display, Robot
+from interfaces.teleop.predicted_grasp import Hands
+from robots.robot import Display, Gripper, Robot
 from vrs.checks import finite_array, number_in
 from vrs.mobile import ArcTimeline, Grid
 from vrs.model import Array, RobotModel, frozen_array
@@ -22,6 +24,7 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from robots.bullet.rooms import Room
+    from robots.bullet.things import Scene
 
 PATH_PERIOD: Final = 0.1
 """The committed path is renewed, trimmed and the traces are drawn at most this often [s]."""
@@ -82,6 +85,7 @@ class TwinScene(Nodes):
         self._links: Callable[[ArrayLike], Array]
         self._surroundings = room, grid, extent
         self._room: DrawnRoom | None = None
+        self._hands: DrawnHands | None = None
         if robot.is_base:
             n, self._length = 3, robot.base.body.length
             self._links = robot.placed
@@ -126,6 +130,9 @@ class TwinScene(Nodes):
             if not meshes:
                 rods = [None, *(rod_of(model, i) for i in range(1, len(rest)))]
         self._traced = bool(rods)
+        gripper = self._robot.device(Gripper)
+        if gripper is not None and gripper.fingers is not None and meshes:
+            self._hands = DrawnHands(self, gripper, len(rest) - 1)
         for twin in COLOURS:
             for i, mesh in enumerate(meshes):
                 path = f"{ROOT}/{twin}/body/{i}"
@@ -145,6 +152,7 @@ class TwinScene(Nodes):
         path: Committed | None = None,
         driven: Mapping[str, Array] | None = None,
         learned: tuple[tuple[int, int], ...] = (),
+        hands: Hands | None = None,
         t: float = 0.0,
         now: float,
     ) -> None:
@@ -157,6 +165,7 @@ class TwinScene(Nodes):
             driven: Where `virtual` and `real` drove until now [m], (k, 2) each; all of it, so that what was given
                 before begins with it or is its beginning. None leaves what is drawn.
             learned: Cells that the virtual environment has.
+            hands: Of arms with fingers, and the things around them; None leaves what is drawn.
             t: Time in the room [s]: who walks in it, and what comes and goes.
             now: [s], never less than before; the same origin as ever, it only spaces updates.
 
@@ -174,6 +183,8 @@ class TwinScene(Nodes):
         self.put_property(f"{ROOT}/real", "visible", real is not None)
         if self._room is not None:
             self._room.show(t)
+        if self._hands is not None and hands is not None:
+            self._hands.show(hands)
         if now >= self.path_due:
             self.path_due = now + PATH_PERIOD
             self._draw(path)
@@ -184,6 +195,12 @@ class TwinScene(Nodes):
             if self._traced:
                 self._trace(poses, now)
         if self.version != before:
+            self.wake()
+
+    def furnish(self, scene: Scene) -> None:
+        """Show the things of a scene from now on, instead of another's; a robot without fingers has none."""
+        if self._hands is not None:
+            self._hands.furnish(scene)
             self.wake()
 
     def say(self, text: str) -> None:

@@ -150,7 +150,7 @@ function checkBroadcast(m) {
 function checkCompact(m) {
   map(m, "compact");
   if (m.type !== undefined && m.type !== "compact") fail("compact", "compact");
-  like(m.q, /^(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?$/, "compact.q"); // 1 to 16 frames that follow each other: *bin* in msgpack, in JSON base64 with padding (RFC 4648).
+  like(m.q, /^(?=.{4})(?:[A-Za-z0-9+/]{4})*(?:[A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?$/, "compact.q"); // 1 to 16 frames that follow each other: *bin* in msgpack, in JSON base64 with padding (RFC 4648).
   m.since = m.since === undefined || m.since === null ? null : whole(m.since, 0, WHOLE, "compact.since"); // As in `Broadcast`; absent: what was told last, with a key frame 1.
   m.falsified = m.falsified === undefined ? [] : list(m.falsified, 0, 256, "compact.falsified", (x) => tuple(x, "compact.falsified", (x) => whole(x, 0, WHOLE, "compact.falsified"), (x) => whole(x, 0, WHOLE, "compact.falsified"), (x) => x === null ? x : whole(x, -WHOLE, WHOLE, "compact.falsified"))); // As in `Broadcast`: what is new since the message before; with a key frame all that are known.
   return m;
@@ -317,6 +317,16 @@ function checkWelcome(m) {
   return m;
 }
 
+/** A hand with fingers as it was measured, and what it can reach. */
+function checkHandReport(m) {
+  map(m, "HandReport");
+  real(m.opening, 0, 1e9, "HandReport.opening"); // Between the fingers [m].
+  real(m.goal, 0, 1e9, "HandReport.goal"); // What they were told to go to, as far as they go [m].
+  m.holds = m.holds === undefined || m.holds === null ? null : whole(m.holds, 0, WHOLE, "HandReport.holds"); // Which of the things that move both fingers press on, from 0, as in the scene; absent: none.
+  m.things = m.things === undefined ? [] : list(m.things, 0, 32, "HandReport.things", (x) => tuple(x, "HandReport.things", (x) => whole(x, 0, WHOLE, "HandReport.things"), (x) => tuple(x, "HandReport.things", (x) => real(x, -REAL, REAL, "HandReport.things"), (x) => real(x, -REAL, REAL, "HandReport.things"), (x) => real(x, -REAL, REAL, "HandReport.things"), (x) => real(x, -2, 2, "HandReport.things"), (x) => real(x, -2, 2, "HandReport.things"), (x) => real(x, -2, 2, "HandReport.things"), (x) => real(x, -2, 2, "HandReport.things")))); // [number, pose]: where things are that have moved lately, x, y, z [m] and a quaternion x, y, z, w in the arm's base frame; now and then all of them.
+  return m;
+}
+
 /** Server: The real robot as it was last heard of; the newest one counts. */
 function checkState(m) {
   map(m, "state");
@@ -336,6 +346,7 @@ function checkState(m) {
   m.round_trip = m.round_trip === undefined || m.round_trip === null ? null : real(m.round_trip, -1e9, 1e9, "state.round_trip"); // Newest time that a message to the robot and the answer were under way, what the robot took in between left out [s]; absent before the first.
   m.messages = m.messages === undefined ? [] : list(m.messages, 0, 64, "state.messages", (x) => tuple(x, "state.messages", (x) => real(x, -1e9, 1e9, "state.messages"), (x) => x === null ? x : real(x, -1e9, 1e9, "state.messages"))); // [sent, arrived]: messages to the robot that the emulated link has delivered or lost (null) since the state before, session time [s]. What the real network adds isn't in it.
   m.late = m.late === undefined ? [] : list(m.late, 0, 128, "state.late", (x) => tuple(x, "state.late", (x) => real(x, -1e9, 1e9, "state.late"), (x) => numbers(x, 1, 64, -1e9, 1e9, "state.late"))); // [t, joints]: measurements that came after later ones, one of six; each for 0.2 s, so some come twice.
+  m.hand = m.hand === undefined || m.hand === null ? null : checkHandReport(m.hand); // Its hand, and the things around it, measured with `q`; absent where it's in no scene.
   return m;
 }
 

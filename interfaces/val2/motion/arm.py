@@ -18,7 +18,7 @@ from interfaces.clients.designer import Issued
 from interfaces.messages import RefusalCode
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
-from interfaces.val2.motion.hand import REMEMBERED, Gripped, Hand
+from interfaces.val2.motion.hand import OPEN, REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.places import (
     NEST,
     READY,
@@ -35,7 +35,18 @@ from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.rows import numbered
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
-from vrs.commands import Alter, Cancel, Command, Insertion, JointTarget, Motion, MotionCommand, PoseTarget, Stop
+from vrs.commands import (
+    Alter,
+    Cancel,
+    Command,
+    Grip,
+    Insertion,
+    JointTarget,
+    Motion,
+    MotionCommand,
+    PoseTarget,
+    Stop,
+)
 from vrs.engine import Engine
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -47,6 +58,10 @@ _NULL_POLL: Final = 0.05
 """How often it's looked whether the other twin is there [s]."""
 _NULL_PATIENCE: Final = 5.0
 """How long NULL waits for it [s]."""
+_FINGERS_TAKE: Final = 0.4
+"""So long after they were told fingers have come to where they go, or to something in between [s]."""
+_FELT_PATIENCE: Final = 5.0
+"""How long it's waited to hear of that [s]."""
 _FINE: Final = math.radians(0.2)
 """100 % of FINE: errors of joints that count as none [rad]."""
 _COARSE: Final = math.radians(2.0)
@@ -93,7 +108,9 @@ class Arm(SettingsInForce):
         self._frames = Frames(robot.model)
         self._frames_since = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
         """Since when TOOL and BASE have been which [s]."""
-        self._hand = Hand(self.parameters, gripped)
+        self._hand = Hand(self.parameters, gripped, self._grip if robot.has_fingers else None)
+        self._gripped_at = -math.inf
+        """When fingers were told something last [s]."""
         self._alterations = Alterations()
         self._pace = MonitorSpeed(robot)
         self._continuous = True
@@ -123,8 +140,27 @@ class Arm(SettingsInForce):
     # Where it is.
 
     def here(self, *, now: float) -> Where:
-        """Where the operator's arm is, the virtual one."""
-        return self.past(now, now=now)
+        """Where the operator's arm is, the virtual one; its hand is as open as the real one was measured to be."""
+        here, hand = self.past(now, now=now), self.robot.other.hand
+        return replace(here, hand=1000.0 * hand.opening) if hand is not None and self._measured() else here
+
+    def felt(self, *, now: float) -> bool:
+        """Whether it's known where the fingers came to, or it has been waited for that for long enough."""
+        self._update(now)
+        return self.robot.other.hand is None or self._measured() or now >= self._gripped_at + _FELT_PATIENCE
+
+    def _measured(self) -> bool:
+        """Whether the real fingers were measured when they had done what they were told last."""
+        return self.robot.other.hand_at >= self._gripped_at + _FINGERS_TAKE
+
+    def _grip(self, opening: float | None) -> None:
+        """Let the fingers go to an opening [mm]; None: to where they are."""
+        hand = self.robot.other.hand
+        if opening is None:
+            opening = 1000.0 * hand.opening if hand is not None else self._hand.opening(self._now)
+        command = Grip(math.inf if opening >= OPEN else opening / 1000.0)
+        self._gripped_at = self._now
+        self._unanswered.append(self.robot.ask(command, now=self._now))
 
     def destination(self, *, now: float) -> Where:
         """Where it goes: where it is, if it goes nowhere."""

@@ -19,6 +19,8 @@ REMEMBERED: Final = 10_000
 
 Gripped = Callable[[float, bool], None]
 """Is told when the hand takes hold of something (True) or lets go [s]."""
+Moved = Callable[[float | None], None]
+"""Is told to what opening the hand begins to move [mm]; None: it stays, without pressing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +58,10 @@ class _Movement:
 class Hand:
     """A hand that opens and closes evenly in HAND.TIME. It remembers when it did."""
 
-    def __init__(self, parameters: Mapping[str, float], gripped: Gripped | None) -> None:
-        self._parameters, self._gripped = parameters, gripped
+    def __init__(
+        self, parameters: Mapping[str, float], gripped: Gripped | None, moved: Moved | None = None
+    ) -> None:
+        self._parameters, self._gripped, self._moved = parameters, gripped, moved
         self._movements = deque([_Movement(-math.inf, -math.inf, OPEN, OPEN)], maxlen=REMEMBERED)
         self._holds = False
         self._orders: list[_Order] = []
@@ -126,6 +130,8 @@ class Hand:
         if holds is not self._holds and self._gripped is not None:
             self._gripped(self.end if holds else t, holds)
         self._holds = holds
+        if self._moved is not None:
+            self._moved(None if to <= 0.0 and not holds else to)
 
 
 def _meaning(hand: float | bool) -> tuple[float, bool]:

@@ -11,7 +11,7 @@ from typing_extensions import override
 from interfaces.clients.designer import Issued
 from interfaces.messages.control import State, Welcome
 from interfaces.val2.motion.robot import OtherTwin, RobotPort
-from vrs.commands import Command, MotionCommand
+from vrs.commands import Command, Grip, MotionCommand
 from vrs.errors import InvalidValueError, UnknownCommandError
 from vrs.ledger import Receipt
 from vrs.model import RobotModel
@@ -32,6 +32,7 @@ class RemoteRobot(RobotPort):
     """An engine at the other end of a connection. Nothing waits: what was asked for is answered later."""
 
     fault_poll_interval = 0.05
+    has_fingers = True
 
     def __init__(self, connection: Connection, model: RobotModel) -> None:
         """Follow a robot.
@@ -115,6 +116,8 @@ class RemoteRobot(RobotPort):
 
     def _shows(self, command: Command | None, receipt: Receipt | None, before: Timeline) -> bool:
         timeline = self.timeline
+        if isinstance(command, Grip):
+            return True
         if timeline is not before:
             if not isinstance(command, MotionCommand) or receipt is None or not receipt.stands:
                 return True
@@ -132,7 +135,8 @@ class RemoteRobot(RobotPort):
         state = self._connection.state
         if state is None:
             return OtherTwin()
-        return OtherTwin(state.q, "" if state is self._outdated else state.halted)
+        halted = "" if state is self._outdated else state.halted
+        return OtherTwin(state.q, halted, state.hand, state.play)
 
     @property
     @override

@@ -12,6 +12,7 @@ from typing_extensions import override
 
 from interfaces.clients.designer import Issued
 from interfaces.messages import Refusal, RefusalCode
+from interfaces.messages.control import HandReport
 from interfaces.teleop.operator import OperatorSite, text_of
 from interfaces.teleop.virtual_arm import VirtualArm
 from vrs.clock import ManualClock
@@ -31,6 +32,10 @@ class OtherTwin:
     """Joints as they were measured last [rad], (n,); None where there's none."""
     halted: str = ""
     """Why it doesn't follow, having stopped by itself; empty while it does."""
+    hand: HandReport | None = None
+    """Its hand as it was measured last; None of one that isn't."""
+    hand_at: float = -math.inf
+    """The time on the timeline that it played then [s]."""
 
 
 class RobotPort(Protocol):
@@ -40,6 +45,8 @@ class RobotPort(Protocol):
     """How often it's to be asked for trouble while it moves [s]; infinity where its driver does so anyway."""
     newest: int
     """Number of the newest thing that was asked for; 0 before."""
+    has_fingers: bool = False
+    """Whether it has fingers that are to be moved."""
 
     @property
     def model(self) -> RobotModel:
@@ -152,13 +159,15 @@ class SiteRobot(EngineRobot):
         execute: Execute | None = None,
         *,
         fault_poll_interval: float = math.inf,
+        has_fingers: bool = False,
     ) -> None:
-        """Reach a site; see `EngineRobot`."""
+        """Reach a site; see `EngineRobot` and `RobotPort`."""
         super().__init__(site.robot.engine, execute, fault_poll_interval=fault_poll_interval)
-        self._site = site
+        self._site, self.has_fingers = site, has_fingers
 
     @property
     @override
     def other(self) -> OtherTwin:
         site = self._site
-        return OtherTwin(None if site.report is None else site.report.q, site.gone or text_of(site.halted))
+        q = None if site.report is None else site.report.q
+        return OtherTwin(q, site.gone or text_of(site.halted), site.robot.hand, site.robot.hand_at)

@@ -36,7 +36,7 @@ def begin_late(sitting, path, **given):
     begin = Begin(
         t=now, robot="puma560", driver="live", title="late", seed=0, delay="none", offset="adaptive",
         service="datagram", link_loss="hold", step=0.02, q=engine.joints(now).tolist(),
-        lateness=str(engine.parameters["lateness"]), software=software(), late=late_of(capture.late),
+        lateness=str(engine.parameters["lateness"]), software=software(), late=late_of(capture.late, 0.0),
     )  # fmt: skip
     sitting.writer = RecordingWriter(path, begin)
     capture.put = sitting.writer.write

@@ -67,7 +67,7 @@ def open_page(new_page):
         if panes:
             wait(page, f"!!window.replay && !!replay.state && replay.views.length === {panes}")
             for k in range(panes):
-                wait(page, f"replay.node({k}, 'vrs', 'real', 'body', '6').children.length === 1")
+                wait(page, f"replay.node({k}, 'vrs', 'real', 'body', '6').children.length === 2")
         return page
 
     return start

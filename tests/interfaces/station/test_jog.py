@@ -53,6 +53,17 @@ def test_what_is_shown_is_the_tool_in_the_base_frame_by_wheres_angles(page: Page
     assert [shown(page, f"J{k}") for k in range(1, 7)] == pytest.approx(np.degrees(q), abs=0.06)
 
 
+def test_the_hand_is_opened_and_closed(page: Page) -> None:
+    for button, opening in (("#hand-close", 0), ("#hand-open", "inf")):
+        page.page.click(button)
+        page.wait(f"{LAST}.command?.type === 'grip' && {LAST}.outcome?.receipt?.status === 'accepted'")
+        assert page.get(f"{LAST}.command.opening") == opening
+    page.page.click("#give")
+    page.wait("station.idle !== ''")
+    page.page.click("#hand-close", force=True)
+    told(page, "control", "#hand-close")
+
+
 def test_angles_are_wheres_at_every_turn(page: Page) -> None:
     rng = np.random.default_rng(3)
     turns = rng.uniform([-180, -90, -180], [180, 90, 180], (30, 3)).tolist()

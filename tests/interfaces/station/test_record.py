@@ -160,7 +160,7 @@ def replayed(page: Page, *names: str) -> Any:
     panes = f"window.replay && replay.state && replay.views.length === {len(names)}"
     until(lambda: shown.evaluate(f"Boolean({panes})"), what=panes)
     for k in range(len(names)):
-        drawn = f"replay.node({k}, 'vrs', 'virtual', 'body', '6').children.length === 1"
+        drawn = f"replay.node({k}, 'vrs', 'virtual', 'body', '6').children.length === 2"
         until(lambda drawn=drawn: shown.evaluate(drawn), what=drawn)
     return shown
 

@@ -182,6 +182,19 @@ def _either(found: dict[str, Any], random: Random) -> None:
         found["rates"] = [0.5, -0.25]
 
 
+def _one_shape(found: dict[str, Any], random: Random) -> None:
+    """A thing is a box or a cylinder."""
+    found.pop(random.choice(("box", "cylinder")), None)
+    if found.get("box") is None and found.get("cylinder") is None:
+        found["box"] = [0.5, 0.25, 0.125]
+
+
+def _named_apart(found: dict[str, Any], random: Random) -> None:
+    """Things have names of their own."""
+    for number, thing in enumerate(found.get("things") or ()):
+        thing["name"] = f"thing {number}"
+
+
 def _one_task(found: dict[str, Any], random: Random) -> None:
     """One thing is asked at a time."""
     given = [name for name in ("go", "jobs") if found.get(name) is not None]
@@ -227,6 +240,8 @@ RULES: tuple[tuple[set[str], Rule], ...] = (
     ({"tool", "speed"}, _pose),
     ({"tool", "stays"}, _pose),
     ({"rates", "twist"}, _either),
+    ({"box", "cylinder"}, _one_shape),
+    ({"floor", "things"}, _named_apart),
     ({"go", "do", "jobs"}, _one_task),
     ({"jobs", "places"}, _jobs),
     ({"tail_start", "end"}, _signs),

@@ -19,7 +19,7 @@ from interfaces.messages.control import ProtocolError
 from interfaces.stream import Encoding, decode, encode
 from tests.interfaces.stream.drawn import edges
 from tests.interfaces.stream.same import same
-from vrs.commands import MotionCommand
+from vrs.commands import Grip, MotionCommand
 
 TRACED = ("/interfaces/stream/", "/interfaces/messages/", "<planted>")
 MARKS: tuple[Any, ...] = (
@@ -187,6 +187,8 @@ def sound(value: Any) -> bool:
         return all(map(sound, value))
     if isinstance(value, MotionCommand) and value.deviation == math.inf:
         return sound(replace(value, deviation=0.0))
+    if isinstance(value, Grip) and value.opening == math.inf:
+        return sound(replace(value, opening=0.0))
     if isinstance(value, msgspec.Struct):
         names = set(value.__struct_fields__) - ({"past"} if isinstance(value, Pulse) else set())
         return all(sound(getattr(value, name)) for name in names)

@@ -116,6 +116,8 @@ def ordered() -> dict[str, commands.Command | None]:
         "alter": commands.Alter([0.0, 0.0, 0.005, 0.0, 0.0, 0.125], commands.Frame.TOOL, POSE, True, 1.5),
         "no more offset": commands.Alter(issued_at=1.75),
         "redo": commands.Redo(),
+        "grip": commands.Grip(0.03125, 1.5),
+        "open the hand": commands.Grip(np.inf, execute_at=2.5),
     }
 
 

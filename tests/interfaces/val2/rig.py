@@ -67,6 +67,10 @@ class FakeArm:
         """All but far ones."""
         return isinstance(location, PrecisionPoint) or abs(float(location.X[0, 3])) < 1e4
 
+    def felt(self, *, now: float) -> bool:
+        """Whether it's known where the hand came to: at once."""
+        return now >= self._seen
+
     def here(self, *, now: float) -> Where:
         """Where it is."""
         self._seen = max(now, self._seen)

@@ -30,6 +30,7 @@ LAST = {
     "10_alter": "it rose by  5.00 mm, and ended  0.00 mm from b\n",
     "11_tasks": "parts so far\n",
     "12_corrections": "from  0.00 to  0.00 mm off the line\n",
+    "13_grasp": "There's nothing in the hand\n",
 }
 """How what they TYPE ends."""
 

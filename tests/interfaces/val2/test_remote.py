@@ -47,7 +47,7 @@ class Line:
 
     def heard(self, halted=""):
         """Something new of the real robot."""
-        self.state = SimpleNamespace(q=MODEL.poses["ready"], halted=halted)
+        self.state = SimpleNamespace(q=MODEL.poses["ready"], halted=halted, hand=None, play=0.0)
 
     def issue(self, command):
         return self._designer.issue(command, now=self.now)
