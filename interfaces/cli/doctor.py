@@ -26,9 +26,9 @@ PACKAGES = (
     "numpy",
     "rich",
     "roboticstoolbox",
-    "ruckig",
     "scipy",
     "trimesh",
+    "yourdfpy",
 )
 OURS = ("vrs", "robots", "interfaces")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "firefox")
@@ -59,8 +59,8 @@ def check_version() -> Found:
 
 
 def check_python() -> Found:
-    """The Python that PyBullet's wheels exist for."""
-    return sys.version_info[:2] == (3, 11), platform.python_version()
+    """A Python that it's made for."""
+    return sys.version_info >= (3, 11), platform.python_version()
 
 
 def check_names() -> Found:
@@ -81,7 +81,9 @@ def check_packages() -> Found:
 
 
 def check_pybullet() -> Found:
-    """PyBullet loads, and was built with NumPy; in a process of its own, which may crash."""
+    """PyBullet loads, and was built with NumPy; in a process of its own, which may crash. Elsewhere MuJoCo is there."""
+    if importlib.util.find_spec("pybullet") is None and not _missing("mujoco"):
+        return True, f"not there; MuJoCo {metadata.version('mujoco')} is"
     code = "import pybullet; print(pybullet.isNumpyEnabled())"
     try:
         probe = subprocess.run(
@@ -142,7 +144,7 @@ class Check(NamedTuple):
 
 CHECKS: Final = (
     Check("version", False, check_version, "install vrs-teleop in this environment"),
-    Check("python", True, check_python, "install Python 3.11 and make the environment with it"),
+    Check("python", True, check_python, "install Python 3.11 or later and make the environment with it"),
     Check("names", True, check_names, f"remove or rename what hides them; ours lie in {HOME}"),
     Check("packages", True, check_packages, "install vrs-teleop again in this environment"),
     Check("pybullet", True, check_pybullet, "install pybullet again, after numpy, from a wheel for this system"),

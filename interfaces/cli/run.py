@@ -19,6 +19,7 @@ from interfaces.cli.demo import (
     show,
 )
 from interfaces.cli.options import (
+    BodyName,
     Delay,
     DialectName,
     Offset,
@@ -49,6 +50,7 @@ def run(
     program: Annotated[str, option("NAME", "Which program is run; the first unless given.")] = "",
     name: RobotName = USUAL,
     tip: Tip = "",
+    body: BodyName = "",
     delay: Delay = DEFAULT_DELAY,
     offset: Offset = ADAPTIVE,
     service: Order = "datagram",
@@ -77,7 +79,10 @@ def run(
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]
-    source, robot = joined([read(path, dialect_of(dialect)) for path in programs], program), val_robot(name, tip)
+    source, robot = (
+        joined([read(path, dialect_of(dialect)) for path in programs], program),
+        val_robot(name, tip).with_body(body),
+    )
     directory, corrected = program_files(files), None if corrections is None else read_corrections(corrections)
     prepare(out, *RESULTS)
     recorder = RunRecorder(out / RECORDING)

@@ -161,6 +161,8 @@ class FollowingArm(RobotSite[Orders, Report]):
         self._model = model
         self._clock = ManualClock(now)
         self.engine = Engine(model, q=q)
+        self._held_since = -math.inf
+        """Play time at which it was last let hold elsewhere than it was to be [s]: a jump of its plan."""
         self.engine.begin_with(opening)
         self.violation: Violation | None = None
         """What was measured that stopped it; None where it wasn't that, or since it may move again."""
@@ -382,6 +384,7 @@ class FollowingArm(RobotSite[Orders, Report]):
         p, limits, timeline = float(play.p[0]), self.engine.limits, self.engine.timeline
         if measured is not None:
             timeline = timeline.edited(p, [hold(_SETTLE, np.clip(measured, limits.q_min, limits.q_max))])
+            self._held_since = p
         elif play.pace[0] == 1.0 and play.rate[0] == 0.0:
             timeline = from_commanded(timeline, p, limits).timeline
         else:
@@ -439,7 +442,7 @@ class FollowingArm(RobotSite[Orders, Report]):
 
     def _plan_from(self, p: float) -> PlanPart:
         timeline = self.engine.timeline
-        low = max(timeline.index_at(p), 0)
+        low = max(timeline.index_at(max(p, self._held_since)), 0)
         high = min(low + SEGMENTS_MOST, len(timeline))
         since = timeline.start_of(low) if low < len(timeline) else timeline.end
         segments = tuple(timeline.segment(i) for i in range(low, high))

@@ -170,3 +170,17 @@ def test_a_described_arm_is_served_with_its_shapes_and_the_names_of_its_joints(r
         assert page.get(names) == ["slide", "shoulder", "elbow", "roll"]
         page.page.locator("button[aria-label='Joint 2 up']").click(delay=500)
         page.wait("station.session.timeline.joints(station.session.now)[1] > 0.001")
+
+
+def test_an_arm_that_its_drives_can_not_hold_sinks_and_the_run_says_so(tmp_path: Path) -> None:
+    """It's held where it was found, again and again, while it sinks on."""
+    (tmp_path / "weak.urdf").write_text(
+        """<robot name="weak"><link name="base"/><link name="arm"><inertial><mass value="5"/><origin xyz="0.5 0 0"/>
+        <inertia ixx="0.01" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="a"
+        type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/><dynamics damping="60"/>
+        <limit lower="-1" upper="1" effort="0.5" velocity="1"/></joint></robot>"""
+    )
+    vrs("demo", "--robot", tmp_path / "weak.urdf", "--delay", "mon", "--out", tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["commands"]["virtual"]["rejected"] > 5
+    assert "more than 0.1 rad" in summary["receipts_virtual"][-1]["reason"]
