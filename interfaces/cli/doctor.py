@@ -81,7 +81,7 @@ def check_packages() -> Found:
 
 
 def check_pybullet() -> Found:
-    """PyBullet loads, and was built with NumPy; in a process of its own, which may crash. Elsewhere MuJoCo is there."""
+    """PyBullet loads, with NumPy, in a process of its own, which may crash; elsewhere MuJoCo is there."""
     if importlib.util.find_spec("pybullet") is None and not _missing("mujoco"):
         return True, f"not there; MuJoCo {metadata.version('mujoco')} is"
     code = "import pybullet; print(pybullet.isNumpyEnabled())"
