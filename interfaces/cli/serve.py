@@ -378,6 +378,7 @@ async def _serve(
         from interfaces.runtime.live.operator import share_world
         from interfaces.runtime.live.twins import ArmTwins
         from interfaces.station.plans import Plans
+        from interfaces.station.poses import Poses
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
@@ -412,6 +413,7 @@ async def _serve(
                     val_room = room
             if not one.robot.is_base:
                 routes += Plans(one.robot.arm, access, operator.clock).routes
+                routes += Poses(one.robot.arm, one.recordings, access, operator.clock).routes
             routes += _station(one, serving, taught=taught is not None).routes
             if one.folder:
                 others.append(Mount(one.folder, routes=routes))

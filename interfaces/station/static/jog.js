@@ -24,9 +24,11 @@ const MOTIONS = [["line", "in a line"], ["joint", "by joints"]];
 const BEGINS = [["now", "now"], ["append", "after the plan"], ["later", "in …"]];
 /** A bar is drawn anew for so small a part of its length: each time takes a moment of a page without a graphics card. */
 const GRAINS = 200;
-/** Time between two looks at the joints [ms]. */
-const LOOK = 100;
+/** Time between two looks at the joints, and at the poses that others save [ms]. */
+const [LOOK, POSES] = [100, 2000];
 const TURN = "as VAL-II's WHERE has it, in the base frame: R = Rz(O − 90°) Ry(A + 90°) Rz(T)";
+const FRAME = "Of the tool's point in the base frame";
+const FRAMES_DIFFER = "In the base frame; WHERE's are in VAL-II's world";
 
 /** A key as it's written on it. */
 const keyName = (code) => code.replace(/Key|Digit/, "").replace(/(Page|Arrow)(.)/, "$1 $2");
@@ -168,7 +170,8 @@ function Tool({ station, go }) {
         <span>${POSE[k]}</span>${button(k, -1, "−")}${field(k)}${button(k, 1, "+")}
         <span>${AXES[k + 3]}</span>${button(k + 3, -1, "−")}${button(k + 3, 1, "+")}
         <span>${POSE[k + 3]}</span>${field(k + 3)}</div>`)}
-    </div></section>`;
+    </div>
+    <p class="hint frame">${station.config.panels.some(({ name }) => name === "terminal") ? FRAMES_DIFFER : FRAME}</p></section>`;
 }
 
 function Poses({ station }) {
@@ -177,12 +180,19 @@ function Poses({ station }) {
   const why = station.idle;
   const pose = ([title, q]) => html`<button type="button" data-pose=${title} ...${barred(why)}
     onClick=${() => jog.go({ target: { type: "joints", q } }, title)}>${title}</button>`;
+  const views = session.mayCommand ? "" : "viewers save and delete no poses";
 
-  function save(event) {
+  useEvery(POSES, () => session.link === "live" && jog.poses());
+
+  async function save(event) {
     event.preventDefault();
-    const wrong = jog.save(name.current.value.trim());
+    const wrong = views || (await jog.save(name.current.value.trim()));
     station.refuse(wrong);
     if (!wrong) name.current.value = "";
+  }
+
+  async function remove(title) {
+    station.refuse(views || (await jog.poses({ name: title })));
   }
 
   return html`<section>
@@ -191,13 +201,14 @@ function Poses({ station }) {
       <input id="later" type="number" min="0.5" max="600" step="0.5" value=${jog.later} hidden=${jog.begin !== "later"}
         aria-label="Seconds from now" onInput=${({ target }) => (jog.later = target.value)} /></div>
     <div class="goes"><div>
-      <div class="poses" role="group" aria-label="Named poses">${Object.entries(session.welcome.poses).map(pose)}
-        ${Object.entries(jog.saved).map(([title, q]) => html`<span class="saved">${pose([title, q])}
-          <button class="quiet" type="button" aria-label=${`Delete pose ${title}`} title="Delete it"
-            onClick=${() => jog.remove(title)}><${Icon} name="delete" /></button></span>`)}</div>
+      <div class="poses" role="group" aria-label="Named poses">${Object.entries(session.welcome.poses).map(pose)}</div>
       <form class="row" onSubmit=${save}><input id="pose-name" ref=${name} maxlength="40" size="10" autocomplete="off"
-          aria-label="Name of a pose to save" placeholder="Name" title="Poses are kept in this browser" />
-        <button id="pose-save" title="Save the joints that are shown, in this browser">Save</button></form></div>
+          aria-label="Name of a pose to save" placeholder="Name" title="The server keeps poses: everyone has them" />
+        <button id="pose-save" ...${barred(views, "Save the joints that are shown, for everyone")}>Save</button></form></div>
       <div class="pad-row"><${Pad} station=${station} twist=${(parts) => jog.twist(parts)} why=${station.steer.idle} /></div>
-    </div></section>`;
+    </div>
+    <div class="poses" role="group" aria-label="Saved poses" hidden=${Object.keys(jog.saved).length === 0}>
+      ${Object.entries(jog.saved).map(([title, q]) => html`<span class="saved">${pose([title, q])}
+        <button class="quiet" type="button" aria-label=${`Delete pose ${title}`} ...${barred(views, "Delete it, for everyone")}
+          onClick=${() => remove(title)}><${Icon} name="delete" /></button></span>`)}</div></section>`;
 }

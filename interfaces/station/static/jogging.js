@@ -4,7 +4,6 @@ import { Speed } from "./handling.js";
 import { computed, figure, observed } from "./ui.js";
 
 const SPEED = "vrs-speed";
-const POSES = "vrs-poses";
 /** What one may ask for of x, y, z [mm] and of the angles O, A, T [deg], either way. */
 const [FARTHEST, FULL_TURN] = [100000, 360];
 const LONGEST_NAME = 24;
@@ -32,15 +31,13 @@ export class Jogging {
       /** What was typed and isn't done yet, by the name of its field, and the one that can't be taken. */
       typed: {},
       wrong: "",
+      /** Saved poses, which the server keeps: joints by name. */
       saved: {},
     });
     const shown = (kind) => computed(() => this.q && this.values(kind, this.q));
     /** Values of the fields at the joints that are shown, see `fields`. */
     this.shown = { joints: shown("joints"), pose: shown("pose") };
-    station.on("welcome", ({ robot }) => {
-      this.kept = `${POSES}-${robot}`;
-      this.saved = JSON.parse(localStorage.getItem(this.kept) ?? "{}");
-    });
+    station.on("welcome", () => this.poses());
   }
 
   get share() {
@@ -200,22 +197,25 @@ export class Jogging {
     this.typed = Object.fromEntries(Object.entries(this.typed).filter(([name]) => !names.has(name)));
   }
 
-  /** Save the joints that are shown under a name, in this browser; why not, "" where it's done. */
-  save(name) {
+  /** Save the joints that are shown under a name; why not, "" where it's done. */
+  async save(name) {
     const taken = name in this.session.welcome.poses || name in this.saved;
     if (!name || name.length > LONGEST_NAME) return `a pose's name has 1 to ${LONGEST_NAME} characters`;
     if (taken) return `there's a pose ${name}: delete it first, or take another name`;
-    this.keep({ ...this.saved, [name]: this.q });
-    return "";
+    return this.poses({ name, q: this.q });
   }
 
-  remove(name) {
-    const { [name]: _, ...others } = this.saved;
-    this.keep(others);
-  }
-
-  keep(saved) {
-    this.saved = saved;
-    localStorage.setItem(this.kept, JSON.stringify(saved));
+  /** Ask the server for the saved poses, perhaps after a change: {name, q}, or {name} to delete one; why not, "" where it's done. */
+  async poses(change) {
+    const { token } = this.session;
+    const headers = token ? { Authorization: "Bearer " + token } : {};
+    try {
+      const given = change && { method: "POST", body: JSON.stringify(change) };
+      const { poses, problem = "" } = await (await fetch(window.VrsLink.FOLDER + "/poses", { headers, ...given })).json();
+      if (poses && JSON.stringify(poses) !== JSON.stringify(this.saved)) this.saved = poses;
+      return problem;
+    } catch {
+      return "the server doesn't answer: nothing was done";
+    }
   }
 }

@@ -176,15 +176,16 @@ function Tools({ strip }) {
     <span class="gap"></span>
     ${tool("undo", "undo", "Take back the newest command", () => session.order(null), "Undo", { why: idle })}
     ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
+    <span class="gap"></span>
+    ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
+      { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
+    <${Loader} strip=${strip} tool=${tool} />
+    <span class="gap"></span>
     ${tool("delete", "delete", "Take the chosen move out of the plan", () => strip.remove(chosen), "Delete", { why })}
     ${tool("via", "alt_route", "Let the chosen move go by another place", () => strip.goBy(place), "Via", { why })}
     <select id="via-place" aria-label="Where a via is" disabled=${why !== ""} value=${place} onChange=${(event) => setPlace(event.target.value)}>
       <option value="up">10 cm higher</option><option value="down">10 cm lower</option>
       ${poses.map((pose) => html`<option value=${pose}>by ${pose}</option>`)}</select>
-    <span class="gap"></span>
-    ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
-      { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
-    <${Loader} strip=${strip} tool=${tool} />
     <span class="grow"></span>
     <span class="muted wide">Drag a scheduled move, or the strip to look back</span>
     ${tool("zoom-out", "remove", "Show more time", () => strip.zoom(1))}

@@ -228,11 +228,11 @@ def token_in(text: str) -> str | None:
 
 HEADERS: Final = server.HEADERS | {
     "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src data: blob:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
     )
 }
-PARTS: Final = ("meshcat.js", "scene.js", "licences.txt")
+PARTS: Final = ("sheets.js", "meshcat.js", "scene.js", "licences.txt")
 """What every page with a 3D view needs."""
 _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".txt": "text/plain"}
 

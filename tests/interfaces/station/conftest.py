@@ -11,6 +11,6 @@ from tests.interfaces.station.opened import SERVE
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Child]:
-    with child(*SERVE, "--port", "0") as running:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Child]:
+    with child(*SERVE, "--port", "0", "--recordings", str(tmp_path_factory.mktemp("recordings"))) as running:
         yield running

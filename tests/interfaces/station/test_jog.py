@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from axe_core_python.sync_playwright import Axe
 
 from interfaces.val2.values import VAL2, Transformation
 from tests.interfaces.live_rig import Child, child
@@ -172,7 +174,7 @@ def test_a_joints_bar_is_drawn_and_moves_when_it_is_let_go(page: Page) -> None:
     page.rest()
 
 
-def test_poses_are_saved_gone_to_and_deleted(page: Page) -> None:
+def test_poses_are_saved_for_all_gone_to_and_deleted(browser: Any, server: Child, page: Page) -> None:
     q = bent(page)
     page.wait("station.jog.q !== null")
     page.page.click("#pose-save")
@@ -187,16 +189,20 @@ def test_poses_are_saved_gone_to_and_deleted(page: Page) -> None:
     page.page.click("[data-pose=ready]")
     page.until(lambda: moved(page, 0.3, q))
     page.rest()
-    page.open()
-    # A page that was long in loading has lost its control meanwhile.
-    page.wait("station.session.holds || station.session.lease.state === 'free'")
-    if not page.get("station.session.holds"):
-        page.take_control()
     saved.click()
     page.until(lambda: page.virtual == pytest.approx(q, abs=1e-6))
-    page.page.click("[aria-label='Delete pose over the table']")
-    saved.wait_for(state="detached")
-    assert page.get("localStorage.getItem('vrs-poses-puma560')") == "{}"
+    for _ in range(2):
+        found = Axe().run(page.page)["violations"]
+        grave = [(one["id"], one["nodes"]) for one in found if one["impact"] in {"serious", "critical"}]
+        assert json.dumps(grave) == "[]"
+        page.page.click("#theme")
+    # Another browser has it, and sees it go.
+    with paged(browser, station(server)) as other:
+        theirs = other.open().page.locator("[data-pose='over the table']")
+        theirs.wait_for()
+        page.page.click("[aria-label='Delete pose over the table']")
+        saved.wait_for(state="detached")
+        theirs.wait_for(state="detached")
 
 
 def test_a_robot_of_three_joints_one_of_them_prismatic(browser: Any) -> None:

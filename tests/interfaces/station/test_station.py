@@ -69,13 +69,31 @@ def test_the_page_is_a_file_and_lets_no_script_run_but_the_servers(server: Child
     unchanged.value.close()
     assert unchanged.value.code == 304
     rules = dict(rule.split(" ", 1) for rule in policy.split("; "))
-    assert (rules["default-src"], rules["script-src"]) == ("'none'", "'self'")
+    assert [rules[key] for key in ("default-src", "script-src", "style-src")] == ["'none'", "'self'", "'self'"]
     assert not re.search(r"<script(?![^>]* src=)|<style| on[a-z]+=| style=", html)
     parts = re.findall(r'(?:src|href)="(/[^"]+)"', html)
     assert len(parts) >= 4
     for part in parts:
         with urllib.request.urlopen(base.rstrip("/") + part, timeout=20) as answer:
             assert answer.read()
+
+
+def test_a_page_that_is_used_keeps_to_its_policy(browser: Any, server: Child) -> None:
+    with paged(browser, station(server)) as page:
+        page.page.add_init_script(
+            "window.against = []; addEventListener('securitypolicyviolation', (e) => against.push(e.blockedURI))"
+        )
+        page.open().take_control()
+        plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 30)
+        for tab in page.get("[...document.querySelectorAll('[role=tab]')].map((one) => one.id)"):
+            page.page.click("#" + tab)
+        page.page.click("#tab-terminal")
+        page.wait("station.terminal !== null && station.terminal.text.endsWith('\\n.')")
+        page.page.click("#theme")
+        # What xterm.js writes as styles counts: without them characters stand in no columns.
+        row = "getComputedStyle(document.querySelector('#terminal-screen .xterm-rows'))"
+        page.wait(f"{row}.fontFamily.startsWith('ui-monospace') && {row}.color === 'rgb(231, 236, 243)'")
+        assert page.get("against") == []
 
 
 def test_what_the_page_may_not_do_isnt_done(page: Page) -> None:

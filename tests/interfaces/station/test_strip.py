@@ -197,6 +197,20 @@ def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     says(page, "#load", "take control first")
 
 
+def test_on_a_phone_all_tools_are_there_without_scrolling(page: Page) -> None:
+    for width, height in ((390, 844), (844, 390)):
+        page.page.set_viewport_size({"width": width, "height": height})
+        # Whether what stands in the middle of each is its own, and nothing hides it.
+        hidden = """[...document.querySelectorAll(".tools :is(button, select)")].filter((tool) => {
+            const { left, top, width, height } = tool.getBoundingClientRect();
+            return !tool.contains(document.elementFromPoint(left + width / 2, top + height / 2));
+        }).map((tool) => tool.id)"""
+        assert page.get(hidden) == []
+        assert page.get("document.querySelector('#pane').getBoundingClientRect().height") >= height / 2
+        track, tick = (page.page.locator(name).first.bounding_box() for name in ("#track", ".tick"))
+        assert tick["y"] + tick["height"] <= track["y"] + track["height"]
+
+
 def test_what_reads_plans_says_what_is_wrong(server: Child) -> None:
     def post(data: bytes) -> tuple[int, dict[str, Any]]:
         try:
