@@ -119,8 +119,7 @@ def test_every_answer_of_a_page_keeps_strangers_out(server: tuple[str, str]) -> 
         assert {key: policy[key] for key in expected} == expected, path
         assert policy["frame-ancestors"] == shown_in, path
         scripts = {source for source in policy["script-src"] if not source.startswith("'nonce-")}
-        # The station's skeleton is a framework's, which compiles its templates.
-        assert scripts <= ({"'self'", "'unsafe-eval'"} if path == "/" else {"'self'"}), path
+        assert scripts <= {"'self'"}, path
 
 
 def test_what_isnt_there_is_not_found(server: tuple[str, str]) -> None:

@@ -177,7 +177,7 @@ function Tools({ strip }) {
     ${tool("undo", "undo", "Take back the newest command", () => session.order(null), "Undo", { why: idle })}
     ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
     <span class="gap"></span>
-    ${tool("save", "download", "Save what is planned to a plan file", () => saveMoves(station), "Save",
+    ${tool("save", "download", "Save what is planned to a plan file: the moves, without vias and roundings", () => saveMoves(station), "Save",
       { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
     <${Loader} strip=${strip} tool=${tool} />
     <span class="gap"></span>
