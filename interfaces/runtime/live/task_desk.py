@@ -167,7 +167,8 @@ class TaskDesk(OperatorDevice):
     def _command(self, task: RobotTask, command: ListCommand) -> str:
         """Let the robot do something with the list, which it's given if it hasn't it."""
         refusal = JobRunner.at(self.jobs, self.progress).receive(command, now=0.0)
-        if not refusal and command in (ListCommand.RUN, ListCommand.RESUME):
+        # A list does what comes before the goal that can't be reached; it isn't to end one that can.
+        if not refusal and command in (ListCommand.RUN, ListCommand.RESUME) and self._doing is Doing.GOAL:
             refusal = self._unreachable(self._moves(command))
         if refusal:
             return refusal
