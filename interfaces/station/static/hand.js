@@ -17,7 +17,7 @@ export function Hand({ station }) {
     else session.order({ type: "grip", opening }, label);
   }
 
-  const button = (id, opening, label, title) => html`<button type="button" id=${id} ...${barred(why, title)}
+  const button = (id, opening, label, title) => html`<button class="small" type="button" id=${id} ...${barred(why, title)}
     onClick=${() => grip(opening, label)}>${title}</button>`;
   return html`<section>
     <div class="head"><h2>Hand</h2><span class="hint grow" id="hand-state">${real ? words(real) : ""}</span>

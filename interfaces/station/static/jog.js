@@ -27,8 +27,7 @@ const GRAINS = 200;
 /** Time between two looks at the joints, and at the poses that others save [ms]. */
 const [LOOK, POSES] = [100, 2000];
 const TURN = "as VAL-II's WHERE has it, in the base frame: R = Rz(O − 90°) Ry(A + 90°) Rz(T)";
-const FRAME = "Of the tool's point in the base frame";
-const FRAMES_DIFFER = "In the base frame; WHERE's are in VAL-II's world";
+const FRAME = "Of the tool's point in the base frame; VAL-II's WHERE tells it in its own world";
 
 /** A key as it's written on it. */
 const keyName = (code) => code.replace(/Key|Digit/, "").replace(/(Page|Arrow)(.)/, "$1 $2");
@@ -156,7 +155,7 @@ function Tool({ station, go }) {
   };
   const field = (k) => html`<${Field} jog=${jog} kind="pose" k=${k} field=${fields[k]} go=${goes}
     label=${k < 3 ? `Tool's ${POSE[k]}` : `Tool's angle ${POSE[k]}`}
-    title=${k < 3 ? "Of the tool's point in the base frame" : `Turn of the tool, ${TURN}`} />`;
+    title=${k < 3 ? FRAME : `Turn of the tool, ${TURN}`} />`;
   return html`<section>
     <div class="head"><h2>Tool</h2>
       <${Choice} id="jog-frame" label="Frame of the tool's axes" options=${FRAMES} value=${jog.frame}
@@ -170,8 +169,7 @@ function Tool({ station, go }) {
         <span>${POSE[k]}</span>${button(k, -1, "−")}${field(k)}${button(k, 1, "+")}
         <span>${AXES[k + 3]}</span>${button(k + 3, -1, "−")}${button(k + 3, 1, "+")}
         <span>${POSE[k + 3]}</span>${field(k + 3)}</div>`)}
-    </div>
-    <p class="hint frame">${station.config.panels.some(({ name }) => name === "terminal") ? FRAMES_DIFFER : FRAME}</p></section>`;
+    </div></section>`;
 }
 
 function Poses({ station }) {

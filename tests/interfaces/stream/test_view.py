@@ -84,7 +84,7 @@ def open_page(new_page: Any) -> Any:
         page.goto(f"{server.url}/view")
         if live:
             wait(page, "document.getElementById('status').dataset.state === 'live'")
-            wait(page, "view.node('vrs', 'real', 'body', '6').children.length === 1")
+            wait(page, "view.node('vrs', 'real', 'body', '6').children.length >= 1")
             wait(page, "view.node('vrs').box !== undefined")
         return page
 
