@@ -78,6 +78,14 @@ def quaternion(R: Array) -> list[float]:
     return [float(x) for x in q / np.linalg.norm(q)]
 
 
+def about(axis: Array, angle: Array) -> Array:
+    """Rotations about a unit vector by angles [rad] of any shape, (…, 3, 3), by Rodrigues' formula."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    return np.asarray(np.eye(3) + s * K + (1.0 - c) * (K @ K))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainLink:
     """A joint and the link that it moves.
@@ -190,10 +198,7 @@ def _motion(link: ChainLink, q: Array) -> tuple[Array, Array]:
     R, p = rotation(link.turn), link.place
     if link.prismatic:
         return np.broadcast_to(R, (len(q), 3, 3)), p + q[:, None] * (R @ link.axis)
-    x, y, z = link.axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    s, c = np.sin(q)[:, None, None], np.cos(q)[:, None, None]
-    return R @ (np.eye(3) + s * K + (1.0 - c) * (K @ K)), np.broadcast_to(p, (len(q), 3))
+    return R @ about(link.axis, q), np.broadcast_to(p, (len(q), 3))
 
 
 def _turned(v: Array, R: Array) -> Array:

@@ -19,7 +19,7 @@ from robots.description.beside import stated_file, stated_of
 from robots.description.description import Description
 from robots.description.numbers import BaseNumbers, parse_base, read_base, stem
 from robots.description.reading import read
-from robots.description.rigid import at_rest, motion, rigid_chain
+from robots.description.rigid import carried, rigid_chain
 from robots.description.wheels import wheeled
 from robots.mobile import differential
 from robots.onboard.laser import LaserModel
@@ -83,8 +83,8 @@ def described(what: str) -> DescribedRobot:
     if path.suffix.lower() == ".toml":
         called, numbers = read_base(path)
         return replace(_differential(called, numbers, str(path)), stated=path)
-    description, stated = read(path), stated_of(path)
-    file = stated_file(path) or path.parent / f"{stem(path)}.vrs.toml"
+    stated = stated_of(path)
+    description, file = read(path, stated), stated_file(path) or path.parent / f"{stem(path)}.vrs.toml"
     base = None if tip else wheeled(description, stated.base or BaseNumbers())
     if base is not None:
         made = _differential(_called(description, path), base.numbers, str(path))
@@ -149,21 +149,14 @@ def _arm_shapes(description: Description) -> Sequence[LinkShape]:
     """
     if not any(link.shapes for link in description.links.values()):
         return ()
-    chain = description.chain(description.tip)
-    numbers = {joint.name: k for k, joint in enumerate((j for j in chain if j.moves), start=1)}
-    of = {description.root: 0}
-    frames = {description.root: np.eye(4)}
-    for joint in description.joints:
-        if joint.name in numbers:
-            of[joint.child], frames[joint.child] = numbers[joint.name], np.eye(4)
-        else:
-            of[joint.child] = of[joint.parent]
-            frames[joint.child] = frames[joint.parent] @ joint.X @ motion(joint, at_rest(joint))
-    last = np.linalg.inv(frames[description.tip])
-    groups: list[list[tuple[LinkShape, Array]]] = [[] for _ in range(len(numbers) + 1)]
+    moving = [joint.name for joint in description.chain(description.tip) if joint.moves]
+    placed = carried(description, moving)
+    last, X_tip = placed[description.tip]
+    to_tip = np.linalg.inv(X_tip)
+    groups: list[list[tuple[LinkShape, Array]]] = [[] for _ in range(len(moving) + 1)]
     for name, link in description.links.items():
-        X = last @ frames[name] if of[name] == len(numbers) else frames[name]
-        groups[of[name]] += [(shape, X) for shape in link.shapes]
+        owner, X = placed[name]
+        groups[owner + 1] += [(shape, to_tip @ X if owner == last else X) for shape in link.shapes]
     return [_together(k, group) for k, group in enumerate(groups)]
 
 

@@ -30,6 +30,7 @@ import numpy as np
 from msgspec import Meta, field
 from msgspec.structs import replace
 
+from robots.chain import rotation
 from robots.solids import Builder, LinkShape
 from vrs.checks import bounded_text
 from vrs.errors import FormatError
@@ -153,14 +154,8 @@ def has_moved(known: ThingPose | None, pose: ThingPose) -> bool:
 
 def pose_matrix(pose: Sequence[float]) -> Array:
     """A pose of position and quaternion, (7,), as a matrix, (4, 4)."""
-    x, y, z, w = pose[3:]
     X = np.eye(4)
-    X[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    X[:3, 3] = pose[:3]
+    X[:3, :3], X[:3, 3] = rotation(pose[3:]), pose[:3]
     return X
 
 

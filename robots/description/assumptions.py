@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from robots.description.description import Description, Joint, JointKind, Link
+from robots.description.description import Description, Joint, JointKind, Link, corners_of
 from robots.description.tips import tip_of
 from vrs.model import Array
 
@@ -224,21 +224,15 @@ def _rigid(description: Description) -> list[list[str]]:
     return list(found.values())
 
 
-def _corners(link: Link) -> Array:
-    """Corners of what a link touches with, else of what it looks like, (n, 3)."""
-    shapes = link.collisions or link.shapes
-    return np.concatenate([shape.vertices for shape in shapes]) if shapes else np.zeros((0, 3))
-
-
 def _volume(link: Link) -> float:
     """Of a link's hull, roughly: half of the box about it [m³]."""
-    corners = _corners(link)
+    corners = corners_of(link.collisions or link.shapes)
     return 0.5 * float(np.prod(np.ptp(corners, axis=0))) if len(corners) else 0.0
 
 
 def _as_box(link: Link, *, moved: bool = False) -> Link:
     """A link with the inertia of a box about its shapes, and perhaps its centre in the middle of it."""
-    corners = _corners(link)
+    corners = corners_of(link.collisions or link.shapes)
     sides = np.maximum(np.ptp(corners, axis=0), 1e-3) if len(corners) else np.full(3, _LEAST)
     middle = corners.min(axis=0) + 0.5 * np.ptp(corners, axis=0) if len(corners) else link.centre
     x, y, z = sides**2

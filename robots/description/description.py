@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
@@ -40,6 +40,11 @@ class Link:
     """What it looks like."""
     collisions: tuple[LinkShape, ...] = ()
     """What it touches with; convex pieces."""
+
+
+def corners_of(shapes: Sequence[LinkShape]) -> Array:
+    """Corners of shapes in one frame, (n, 3) [m]."""
+    return np.concatenate([shape.vertices for shape in shapes]) if shapes else np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True)

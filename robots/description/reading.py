@@ -10,7 +10,7 @@ from robots.description.beside import joined, stated_of
 from robots.description.description import Description
 from robots.description.files import parsed, read_root
 from robots.description.mjcf import read_mjcf
-from robots.description.numbers import stem
+from robots.description.numbers import Stated, stem
 from robots.description.urdf import read_urdf
 from robots.description.xacro_process import expanded
 from vrs.errors import FormatError
@@ -19,18 +19,19 @@ FORMATS: Final = (".urdf", ".xacro", ".xml", ".mjcf")
 """Endings of descriptions."""
 
 
-def read(path: Path) -> Description:
+def read(path: Path, stated: Stated | None = None) -> Description:
     """Return what a description says, with what stands beside it; nothing is assumed yet.
 
     Args:
         path: A URDF, xacro or MJCF file; what it is, its root element says.
+        stated: What its TOML file states, where that has been read already.
 
     Raises:
         FormatError: If it can't be read, isn't one, or something beside it isn't as it should be.
     """
     if not path.is_file():
         raise FormatError(str(path), "there's no such file")
-    stated = stated_of(path)
+    stated = stated_of(path) if stated is None else stated
     root = read_root(path)
     if path.suffix.lower() == ".xacro" or (root.tag == "robot" and _is_xacro(root)):
         root = parsed(expanded(path, stated.arguments), str(path))

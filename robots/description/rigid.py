@@ -1,20 +1,41 @@
-"""What a description's arm weighs: a chain of rigid links."""
+"""Which links of a description move as one, where they are, and what its arm weighs: a chain of rigid links."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from robots.chain import Chain, ChainLink, Inertia, quaternion, together
+from robots.chain import Chain, ChainLink, Inertia, about, quaternion, together
 from robots.description.description import Description, Joint, JointKind
 from vrs.model import Array
 
 
-def rigid_chain(description: Description, tip: str) -> Chain:
-    """The links between the joints that lead to a tip.
+def carried(description: Description, moving: Sequence[str]) -> dict[str, tuple[int, Array]]:
+    """Which joint each link goes with, and where it is in the frame that this joint moves.
 
     What hangs on other joints is fixed where they rest: at 0, or at the limit that is nearest to it.
+
+    Args:
+        description: Of the robot.
+        moving: Names of the joints that move.
+
+    Returns:
+        By link the number of the joint, −1 for those that stay with the root, and a pose, (4, 4).
+    """
+    found: dict[str, tuple[int, Array]] = {description.root: (-1, np.eye(4))}
+    for joint in description.joints:
+        owner, X = found[joint.parent]
+        if joint.name in moving:
+            found[joint.child] = moving.index(joint.name), np.eye(4)
+        else:
+            found[joint.child] = owner, X @ joint.X @ motion(joint, at_rest(joint))
+    return found
+
+
+def rigid_chain(description: Description, tip: str) -> Chain:
+    """The links between the joints that lead to a tip.
 
     Args:
         description: Of the robot, nothing missing.
@@ -23,23 +44,18 @@ def rigid_chain(description: Description, tip: str) -> Chain:
     Returns:
         A link a moving joint.
     """
-    moving = {joint.name: k for k, joint in enumerate(j for j in description.chain(tip) if j.moves)}
-    placed: dict[str, tuple[int, Array]] = {description.root: (-1, np.eye(4))}
-    joints: list[tuple[Joint, Array]] = []
-    for joint in description.joints:
-        owner, X = placed[joint.parent]
-        if joint.name in moving:
-            joints.append((joint, X @ joint.X))
-            placed[joint.child] = moving[joint.name], np.eye(4)
-        else:
-            placed[joint.child] = owner, X @ joint.X @ motion(joint, at_rest(joint))
-    parts: list[list[Inertia]] = [[] for _ in joints]
+    moving = [joint for joint in description.chain(tip) if joint.moves]
+    placed = carried(description, [joint.name for joint in moving])
+    parts: list[list[Inertia]] = [[] for _ in moving]
     for name, (owner, X) in placed.items():
         if owner >= 0:
             link = description.links[name]
             parts[owner].append(Inertia(link.mass, link.centre, link.inertia).moved(X))
-    links = tuple(_link(joint, X, together(part)) for (joint, X), part in zip(joints, parts, strict=True))
-    return Chain(links, placed[tip][1])
+    links = [
+        _link(joint, placed[joint.parent][1] @ joint.X, together(part))
+        for joint, part in zip(moving, parts, strict=True)
+    ]
+    return Chain(tuple(links), placed[tip][1])
 
 
 def _link(joint: Joint, X: Array, inertia: Inertia) -> ChainLink:
@@ -73,7 +89,5 @@ def motion(joint: Joint, q: float) -> Array:
     if joint.kind is JointKind.PRISMATIC:
         X[:3, 3] = q * joint.axis
     elif joint.kind is not JointKind.FIXED:
-        x, y, z = joint.axis
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        X[:3, :3] += math.sin(q) * K + (1.0 - math.cos(q)) * (K @ K)
+        X[:3, :3] = about(joint.axis, np.array(q))
     return X

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from robots.description.description import Description, Joint, JointKind, Link
+from robots.description.description import Description, Joint, JointKind, corners_of
 from robots.description.numbers import BaseNumbers
-from robots.description.rigid import at_rest, motion
+from robots.description.rigid import carried
 from robots.solids import LinkShape
 from vrs.model import Array
 
@@ -54,10 +54,7 @@ class _Wheel:
 
 def placed(description: Description) -> dict[str, Array]:
     """Poses of all links in the root's frame where joints are at 0, or as near as their limits allow, (4, 4)."""
-    poses = {description.root: np.eye(4)}
-    for joint in description.joints:
-        poses[joint.child] = poses[joint.parent] @ joint.X @ motion(joint, at_rest(joint))
-    return poses
+    return {name: X for name, (_, X) in carried(description, ()).items()}
 
 
 def wheeled(description: Description, stated: BaseNumbers) -> WheeledBase | None:
@@ -97,7 +94,8 @@ def _wheels(description: Description, poses: dict[str, Array]) -> list[_Wheel]:
         axis = X[:3, :3] @ joint.axis
         if not endless or steered or joint.mimic is not None or abs(axis[2]) > _LEVEL:
             continue
-        corners = _corners(description.links[joint.child])
+        link = description.links[joint.child]
+        corners = corners_of(link.shapes or link.collisions)
         if not len(corners):
             continue
         along = corners @ joint.axis
@@ -105,11 +103,6 @@ def _wheels(description: Description, poses: dict[str, Array]) -> list[_Wheel]:
         centre = X[:3, :3] @ (joint.axis * 0.5 * (along.min() + along.max())) + X[:3, 3]
         found.append(_Wheel(joint, centre, axis, radius, float(np.ptp(along))))
     return found
-
-
-def _corners(link: Link) -> Array:
-    shapes = link.shapes or link.collisions
-    return np.concatenate([shape.vertices for shape in shapes]) if shapes else np.zeros((0, 3))
 
 
 def _across(wheels: list[_Wheel]) -> Array:

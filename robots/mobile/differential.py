@@ -93,7 +93,7 @@ def differential(name: str, given: BaseNumbers) -> Differential:
     wheel_mass, caster_mass = 0.03 * mass, 0.01 * mass
     lump = Lump(
         "body",
-        (length, inner, max(0.6 * height, 0.2 * height)),
+        (length, inner, 0.6 * height),
         (middle, 0.0, clearance + 0.3 * height),
         mass - 2 * wheel_mass - 2 * caster_mass,
     )
