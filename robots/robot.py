@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -312,6 +313,17 @@ class Robot:
         """The point of an arm's tool, in the last link's frame [m]."""
         gripper = self.device(Gripper)
         return (0.0, 0.0, 0.0) if gripper is None else gripper.point
+
+    @property
+    def hand(self) -> Gripper | None:
+        """Its gripper, where that has fingers; else None."""
+        gripper = self.device(Gripper)
+        return None if gripper is None or gripper.fingers is None else gripper
+
+    @property
+    def stroke(self) -> float:
+        """How far its fingers open [m]; infinite of a hand without, which is just open."""
+        return math.inf if self.hand is None or self.hand.fingers is None else self.hand.fingers.stroke
 
     def shapes(self) -> tuple[LinkShape, ...]:
         """Its shapes; without an appearance a mobile robot is a box, and an arm has none."""

@@ -10,8 +10,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.media.messages import HEAD, NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
-from interfaces.pipes import start
+from interfaces.media.messages import NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.pipes import HEAD, start
 from robots.bullet.rooms import Room
 from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
 from robots.robot import USUAL_BASE

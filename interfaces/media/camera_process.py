@@ -11,7 +11,8 @@ import sys
 from typing import BinaryIO
 
 from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
-from interfaces.media.messages import HEAD, ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.media.messages import ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.pipes import HEAD
 from interfaces.system import be_nice
 from robots.mobile.camera import Look, Sight
 from robots.robot import HeadCamera, load

@@ -6,14 +6,13 @@ from typing import Final, TypeAlias, TypeVar
 
 import msgspec
 
+from interfaces.pipes import framed
 from robots.bullet.rooms import Room
 from robots.mobile.camera import Lens
 from vrs.errors import FormatError
 
 MESSAGE_MOST: Final = 1 << 24
 """Largest message [bytes]."""
-HEAD: Final = 4
-"""Bytes of a message's length before it, big-endian."""
 
 
 class Setup(msgspec.Struct, frozen=True, tag=True):
@@ -73,8 +72,7 @@ NEWS: Final[msgspec.msgpack.Decoder[News]] = msgspec.msgpack.Decoder(News)
 
 def encode(message: Order | News) -> bytes:
     """A message with its length before it."""
-    data = _encoder.encode(message)
-    return len(data).to_bytes(HEAD, "big") + data
+    return framed(_encoder.encode(message))
 
 
 def size_of(head: bytes) -> int:

@@ -35,8 +35,7 @@ from interfaces.messages.fields import (
     Value,
     Word,
 )
-from robots.bullet.things import MOST_THINGS as MOST_SCENE_THINGS
-from robots.bullet.things import Scene, ThingPose
+from robots.bullet.things import MOST_SCENE_THINGS, Scene, ThingPose
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
 from vrs.checks import sized_array

@@ -31,8 +31,7 @@ from interfaces.messages.fields import (
 )
 from interfaces.messages.segments import MOST_POWERS, placed, written
 from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
-from robots.bullet.things import MOST_THINGS as SCENE_THINGS
-from robots.bullet.things import Scene, ThingPose
+from robots.bullet.things import MOST_SCENE_THINGS, Scene, ThingPose
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt
@@ -639,7 +638,7 @@ class HandEntry(Entry, frozen=True, omit_defaults=True, gc=False, tag="hand"):
     """Between the fingers [m]."""
     holds: Count | None = None
     """Which of the things that move both fingers press on, from 0; None for none."""
-    things: Annotated[tuple[tuple[Count, ThingPose], ...], Meta(max_length=SCENE_THINGS)] = ()
+    things: Annotated[tuple[tuple[Count, ThingPose], ...], Meta(max_length=MOST_SCENE_THINGS)] = ()
     """[number, pose]: where things are that have moved: x, y, z [m], a quaternion x, y, z, w; in the base frame."""
 
 

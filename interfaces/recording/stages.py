@@ -15,7 +15,6 @@ from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.teleop.predicted_grasp import Hands, PredictedGrasp
 from robots.bullet.things import Scene
-from robots.robot import Gripper
 from vrs.model import Array
 
 MARGIN = 3.0
@@ -50,9 +49,8 @@ class Stage:
             around["grid"] = None if facts is None or facts.grid is None else grid_of(facts.grid)
             around["extent"] = self._extent()
         self.scene = TwinScene(recording.robot, looks=bodies(recording.robot), **around)
-        gripper = recording.robot.device(Gripper)
-        self._fingers = None if gripper is None else gripper.fingers
-        self._grasp = None if gripper is None or gripper.fingers is None else PredictedGrasp(gripper)
+        hand = recording.robot.hand
+        self._grasp = None if hand is None else PredictedGrasp(hand)
         self._shown = -np.inf
 
     def show(self, frame: PlaybackFrame, committed: Committed | None, *, now: float) -> None:
@@ -70,14 +68,13 @@ class Stage:
             }
             around["learned"] = changes[bisect_right(changes, frame.t, key=lambda change: change[0]) - 1][1]
             around["t"] = frame.t
-        if self._fingers is not None:
+        if self._grasp is not None:
             around["hands"] = self._hands(frame, frame.q_virtual)
         self.scene.show(virtual=frame.q_virtual, real=frame.q_real, path=committed, now=now, **around)
 
     def _hands(self, frame: PlaybackFrame, q: Array) -> Hands:
         """Both hands, and the things where they were measured, or where the virtual hand has taken one."""
         assert self._grasp is not None
-        assert self._fingers is not None
         recording, t, before = self._recording, frame.t, self._shown
         scene, goals, poses = recording.hands.scene, recording.grips, recording.hands.poses(t)
         self._shown = t
@@ -89,7 +86,7 @@ class Stage:
         opening, predicted = self._grasp.advance(recording.model.forward(q), goals, poses, now=t)
         real = recording.hands.opening(t)
         if real is None and frame.play is not None:
-            real = self._fingers.opening(goals, frame.play)
+            real = self._grasp.fingers.opening(goals, frame.play)
         return Hands(opening, real, poses, predicted)
 
     def _grown(self) -> None:

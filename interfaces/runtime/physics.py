@@ -163,14 +163,7 @@ class PhysicsProcess:
         """The descriptor that can be read when there's something to `poll`."""
         return self._socket.fileno()
 
-    def feed(
-        self,
-        reference: JointReference,
-        start: int,
-        *,
-        placed: bool = False,
-        grips: Grips = (),
-    ) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False, grips: Grips = ()) -> bool:
         """Give references, which count for their ticks and instead of all that was given for later ones.
 
         After the last one its position is held, if it's at rest; if it's not, the body brakes and tells a fault.
@@ -329,14 +322,7 @@ FEED = 0.1
 class Fed(Protocol):
     """What takes references; see `PhysicsProcess`."""
 
-    def feed(
-        self,
-        reference: JointReference,
-        start: int,
-        *,
-        placed: bool = False,
-        grips: Grips = (),
-    ) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False, grips: Grips = ()) -> bool:
         """Give references from a tick on, and what the hand is told."""
 
     def acknowledge(self, fault: Fault) -> None:

@@ -38,7 +38,7 @@ from interfaces.system import software
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots.bullet.grasping import grasping
 from robots.bullet.things import Scene
-from robots.robot import ArmBody, Gripper, Robot, exact_arm
+from robots.robot import ArmBody, Robot, exact_arm
 from vrs import Engine, Lateness, Receipt, Status
 from vrs.model import Array
 from vrs.timeline import Timeline
@@ -96,9 +96,7 @@ class TwinSession:
         """
         model = robot.arm
         self._start, self._robot, self._offset, self._body, self._scene = start, robot, offset, body, scene
-        fingers = None if (gripper := robot.device(Gripper)) is None else gripper.fingers
-        stroke = math.inf if fingers is None else fingers.stroke
-        virtual = VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE, stroke=stroke)
+        virtual = VirtualArm(model, start, now=0.0, lateness=Lateness.POSTPONE, stroke=robot.stroke)
         self.operator = OperatorSite(virtual)
         config = RobotSiteConfig(fixed_offset=offset, beat=REPORT)
         self._site = FollowingArm(model, start, now=0.0, config=config)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interfaces.station.panels import Offer
-from robots.robot import Gripper, Robot
+from robots.robot import Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -85,7 +85,7 @@ def described(robot: Robot) -> dict[str, Any]:
     if robot.is_base:
         return {"segments": Offer.ARCS, "name": robot.name}
     home, S = screws(robot.arm)
-    gripper, hand = robot.device(Gripper), None
+    gripper, hand = robot.hand, None
     if gripper is not None and gripper.fingers is not None:
         # The fingers' middles are so far from the middle of the last link, beside half of the opening [m].
         hand = {"link": len(home) - 1, "x": gripper.point[0], "aside": gripper.fingers.thickness / 2}

@@ -10,7 +10,7 @@ import numpy as np
 
 from robots.bullet.grasping import moving
 from robots.bullet.things import Scene, ThingPose, pose_matrix
-from robots.robot import Gripper
+from robots.robot import Fingers, Gripper
 from vrs.model import Array
 from vrs.scheduler import HandGoal
 
@@ -41,6 +41,12 @@ class PredictedGrasp:
     _held: tuple[int, Array] | None = None
     """What it holds, and where that is in the hand's frame, (4, 4)."""
 
+    @property
+    def fingers(self) -> Fingers:
+        """The hand's."""
+        assert self.gripper.fingers is not None
+        return self.gripper.fingers
+
     def advance(
         self, X: Array, goals: Sequence[HandGoal], poses: Mapping[int, ThingPose], *, now: float
     ) -> tuple[float, tuple[int, Array] | None]:
@@ -55,8 +61,7 @@ class PredictedGrasp:
         Returns:
             Its opening [m]; and which thing it has taken along, and where to, (4, 4), None for none.
         """
-        fingers = self.gripper.fingers
-        assert fingers is not None
+        fingers = self.fingers
         opening = fingers.opening(goals, now)
         hand = np.array(X)
         hand[:3, 3] += X[:3, :3] @ self.gripper.point

@@ -361,7 +361,6 @@ def fingered(robot: Robot) -> Gripper:
     Raises:
         InvalidValueError: If it has none with fingers.
     """
-    gripper = robot.device(Gripper)
-    if gripper is None or gripper.fingers is None:
+    if robot.hand is None:
         raise InvalidValueError("scene", robot.name, "of a robot whose gripper has fingers")
-    return gripper
+    return robot.hand

@@ -37,7 +37,7 @@ from vrs.errors import FormatError
 from vrs.model import Array
 from vrs.record import Record
 
-MOST_THINGS: Final = 32
+MOST_SCENE_THINGS: Final = 32
 """Things of a scene."""
 STIRRED: Final = 2e-4
 """A thing has moved whose place or turn is off by more than this [m, 1] from what was known of it."""
@@ -126,7 +126,7 @@ class Scene(Record, frozen=True, omit_defaults=True, gc=False, forbid_unknown_fi
 
     floor: Length
     """Height of the floor in the arm's base frame [m]."""
-    things: Annotated[tuple[Thing, ...], Meta(max_length=MOST_THINGS)] = ()
+    things: Annotated[tuple[Thing, ...], Meta(max_length=MOST_SCENE_THINGS)] = ()
 
     if TYPE_CHECKING:
 

@@ -39,14 +39,7 @@ class Site:
         self.told: list[Rows] = []
         self.news: list[News] = []
 
-    def feed(
-        self,
-        reference: JointReference,
-        start: int,
-        *,
-        placed: bool = False,
-        grips: Grips = (),
-    ) -> bool:
+    def feed(self, reference: JointReference, start: int, *, placed: bool = False, grips: Grips = ()) -> bool:
         self.told.append(Rows(0, start, placed, np.stack(reference, axis=1).tobytes()))
         return True
 

@@ -21,7 +21,7 @@ from interfaces.teleop import OperatorSite, OperatorSiteConfig, RobotLine, Virtu
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.operator import Halt, HaltCause, VirtualRobot, text_of
 from interfaces.teleop.predicted_grasp import Hands, PredictedGrasp
-from robots.robot import Gripper, Robot
+from robots.robot import Robot
 from vrs.model import Array, home
 
 TOLD_AGAIN = 0.2
@@ -118,12 +118,8 @@ class ArmTwins(LiveTwins[VirtualArm]):
         model = robot.arm
         q = home(model) if q is None else q
         warm(model, q)
-        gripper = robot.device(Gripper)
-        fingers = None if gripper is None else gripper.fingers
-        stroke = math.inf if fingers is None else fingers.stroke
-        virtual = VirtualArm(model, q, now=0.0, config=config, stroke=stroke)
-        self._fingers = fingers
-        self._grasp = None if gripper is None or fingers is None else PredictedGrasp(gripper)
+        virtual = VirtualArm(model, q, now=0.0, config=config, stroke=robot.stroke)
+        self._grasp = None if robot.hand is None else PredictedGrasp(robot.hand)
         self.operator = OperatorSite(virtual, halted=Halt(HaltCause.NOT_MET))
         self.line: RobotLine = RobotLine(self.operator, conditions, np.random.default_rng(seed))
         self.site = Site(virtual.engine)
@@ -181,12 +177,12 @@ class ArmTwins(LiveTwins[VirtualArm]):
     def _hands(self, q: Array, now: float) -> Hands | None:
         """Both hands: the virtual one as it's told, the real one as it's measured, else as it's told."""
         virtual, report = self.operator.robot, self.operator.report
-        if self._grasp is None or self._fingers is None:
+        if self._grasp is None:
             return None
         goals = virtual.engine.scheduler.grips
         X = virtual.engine.model.forward(q)
         opening, predicted = self._grasp.advance(X, goals, virtual.things, now=now)
-        real = None if report is None else self._fingers.opening(goals, report.q_at)
+        real = None if report is None else self._grasp.fingers.opening(goals, report.q_at)
         return Hands(opening, real if virtual.hand is None else virtual.hand.opening, virtual.things, predicted)
 
     @override

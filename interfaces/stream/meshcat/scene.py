@@ -16,7 +16,7 @@ from interfaces.stream.meshcat.meshes import Bodies, rod_of
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.stream.meshcat.room import DrawnRoom
 from interfaces.teleop.predicted_grasp import Hands
-from robots.robot import Display, Gripper, Robot
+from robots.robot import Display, Robot
 from vrs.checks import finite_array, number_in
 from vrs.mobile import ArcTimeline, Grid
 from vrs.model import Array, RobotModel, frozen_array
@@ -130,9 +130,8 @@ class TwinScene(Nodes):
             if not meshes:
                 rods = [None, *(rod_of(model, i) for i in range(1, len(rest)))]
         self._traced = bool(rods)
-        gripper = self._robot.device(Gripper)
-        if gripper is not None and gripper.fingers is not None and meshes:
-            self._hands = DrawnHands(self, gripper, len(rest) - 1)
+        if self._robot.hand is not None and meshes:
+            self._hands = DrawnHands(self, self._robot.hand, len(rest) - 1)
         for twin in COLOURS:
             for i, mesh in enumerate(meshes):
                 path = f"{ROOT}/{twin}/body/{i}"
