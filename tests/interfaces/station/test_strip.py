@@ -146,7 +146,9 @@ def test_undo_is_redone(page: Page) -> None:
     page.page.click("#tab-receipts")
     told = page.page.locator("#receipts")
     until(lambda: f"#{second} Redo" in told.text_content())
-    page.wait("!document.getElementById('receipts').textContent.includes('taken back')")
+    for move in (first, second):
+        moved_to = told.locator("li", has_text=f"#{move} Move to")
+        until(lambda row=moved_to: row.get_attribute("data-status") in ("accepted", "postponed"))
     page.page.click("#redo")
     page.wait(f"{NOTICE}.includes('nothing to redo')")
     clear(page)
