@@ -187,7 +187,8 @@ class _Checker(ProgramCompiler):
     def _check(self, i: Instruction, n: int) -> None:
         self._statement = i
         if i.passed is not None and i.keyword not in forms.UNAVAILABLE:
-            detail = f"{i.keyword} {i.passed}".rstrip() + " is passed over"
+            why = f": {forms.PASSED[i.keyword]}" if i.keyword in forms.PASSED else ""
+            detail = f"{i.keyword} {i.passed}".rstrip() + f" is passed over{why}"
             self._warnings.append(ValError("No meaning here", detail, place=i.at))
         self._errors += self._names.wrong_calls(i)
         before = len(self._errors)

@@ -50,12 +50,12 @@ _STAND_INS: Final = {
     "FOR": "FOR n = 1 TO 1", "CASE": "CASE 1 OF", "VALUE": "VALUE 1:", "ANY": "ANY",
 }  # fmt: skip
 """What keeps a structure whole where one of its lines can't be read."""
-_SHAPES: Final = (
-    ("IF", re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE)),
-    ("WHILE", re.compile(r"\bDO\s*(;|$)", re.IGNORECASE)),
-    ("CASE", re.compile(r"\bOF\s*(;|$)", re.IGNORECASE)),
-    ("FOR", re.compile(r"=.*\bTO\b", re.IGNORECASE)),
-)
+_SHAPES: Final = {
+    "IF": re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE),
+    "WHILE": re.compile(r"\bDO\s*(;|$)", re.IGNORECASE),
+    "CASE": re.compile(r"\bOF\s*(;|$)", re.IGNORECASE),
+    "FOR": re.compile(r"=.*\bTO\b", re.IGNORECASE),
+}
 """How lines look that begin a structure, whatever their first word."""
 
 
@@ -440,8 +440,9 @@ def _stand_in(line: str, number: int, error: ValError) -> Step:
     label, word, assigns = head.groups() if head is not None else (None, None, None)
     keyword = (word or "").upper()
     if keyword and not assigns and keyword not in forms.INSTRUCTIONS:
-        shaped = (kind for kind, shape in _SHAPES if shape.search(line))
-        keyword = closest(keyword, forms.INSTRUCTIONS) or next(shaped, "")
+        shaped = next((kind for kind, shape in _SHAPES.items() if shape.search(line)), "")
+        near = closest(keyword, forms.INSTRUCTIONS)
+        keyword = shaped if not near or near in _SHAPES else near
     jumps = keyword == "IF" and _JUMP.search(line)
     stands = "" if assigns or jumps else _STAND_INS.get(keyword, "")
     label = "" if label is None or error.what == "Invalid label" else label

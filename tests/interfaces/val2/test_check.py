@@ -155,6 +155,11 @@ def test_what_has_no_meaning_here_is_a_warning():
     ]
 
 
+def test_an_unknown_word_that_begins_like_a_structure_leaves_those_around_it_whole():
+    assert [f[1:4:2] for f in found("IF 1 == 2 THEN", 'WIBBLE 3, "x"', "END")] == [("Undefined instruction", 3)]
+    assert [f[1:4:2] for f in found("WHLE 1 == 2 DO", "END")] == [("Undefined instruction", 2)]
+
+
 def test_what_is_read_of_a_file_counts_as_set():
     assert found('ATTACH (lun, 4) "DISK"', "READ (lun) $line, n", "TYPE $line, n, lun") == []
 
@@ -215,7 +220,8 @@ def test_vrs_check_says_what_is_wrong_and_exits_2(tmp_path, capsys):
     said = capsys.readouterr().out.splitlines()
     assert said == [
         f"{path}:2:8: error: *Undefined location* p; nothing in the file sets it (program main, step 1)",
-        f"{path}:3:2: warning: *No meaning here* SELECT 3 is passed over (program main, step 2)",
+        f"{path}:3:2: warning: *No meaning here* SELECT 3 is passed over: there is one robot"
+        " (program main, step 2)",
         "1 error, 1 warning.",
     ]
     assert exit_code("check", str(path), "--json") == 2
