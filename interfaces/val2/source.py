@@ -17,7 +17,7 @@ from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.grammar import name_of, undefined
 from interfaces.val2.memory import KINDS, MOST_DIMENSIONS
-from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
+from interfaces.val2.parser import lines_of, no_statement, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.signals import SignalRule
 from interfaces.val2.syntax import BLANK, Apply, Expression, Instruction, Number, Program, Step, Text, Variable
@@ -256,8 +256,10 @@ class _File:
             match self._steps[-1].statement:
                 case Instruction("PARAMETER", (Number(value),), ("VPLUS",)):
                     self._speak(VPLUS if value else VAL2)
-        elif (code := split_comment(line, number)[0]).strip():
-            self._value(code, line, number, strict=strict)
+        elif self._section or not no_statement(line):
+            code = split_comment(line, number, value=True)[0]
+            if code.strip():
+                self._value(code, line, number, strict=strict)
 
     def _speak(self, dialect: Dialect) -> None:
         """Read the program that is being read, and what comes, in a dialect."""
@@ -270,7 +272,7 @@ class _File:
         if word == ".PROGRAM":
             self._begin(parse_header(line, number))
             return
-        code = split_comment(line, number)[0]
+        code = split_comment(line, number, value=True)[0]
         behind = indented(code) + len(word)
         if code[behind:].strip():
             raise syntax_error(f"allowed: {word} alone on its line", number, indented(code, behind) + 1)
