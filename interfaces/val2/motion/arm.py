@@ -20,8 +20,6 @@ from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
 from interfaces.val2.motion.hand import OPEN, REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.places import (
-    NEST,
-    READY,
     Alterations,
     Frames,
     Where,
@@ -440,11 +438,11 @@ class Arm(SettingsInForce):
 
     def go_ready(self, *, now: float) -> None:
         """READY."""
-        self._move(READY, False, now)
+        self._move(self._frames.conventions.ready, False, now)
 
     def nest(self, *, now: float) -> None:
         """NEST."""
-        self._move(NEST, False, now)
+        self._move(self._frames.conventions.nest, False, now)
 
     def align(self, *, now: float) -> None:
         """ALIGN: turn the tool's axis to the nearest world axis."""
