@@ -17,7 +17,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.control import ServedControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.motion import Arm, SiteRobot
+from interfaces.val2.motion import Arm, SiteRobot, conventions_of
 from interfaces.val2.parser import parse_expression
 from vrs.clock import Clock
 from vrs.model import Array
@@ -26,6 +26,7 @@ from vrs.scheduler import FRESH
 if TYPE_CHECKING:
     from interfaces.teleop import OperatorSite
     from interfaces.teleop.virtual_arm import VirtualArm
+    from robots.robot import Robot
 
 HOST: Final = "127.0.0.1"
 """Terminals come from this machine only: there's no encryption."""
@@ -121,19 +122,22 @@ class TerminalRoom:
         return min([self._shared.next_deadline(), *(terminal.next_deadline() for terminal in self._terminals)])
 
 
-def served_room(client: LocalClient, site: OperatorSite[VirtualArm], directory: Path, version: str) -> TerminalRoom:
+def served_room(
+    client: LocalClient, site: OperatorSite[VirtualArm], robot: Robot, directory: Path, version: str
+) -> TerminalRoom:
     """The room at a server's robot, which a client of the server in its own process moves.
 
     Args:
         client: The client.
         site: Where the robot is.
+        robot: Which that is.
         directory: Of LOAD and STORE.
         version: Name and version of the program.
     """
-    robot = SiteRobot(
+    port = SiteRobot(
         site, lambda command, _now: client.execute(command), fault_poll_interval=FAULT_POLL, has_fingers=True
     )
-    arm = Arm(robot)
+    arm = Arm(port, conventions=conventions_of(robot))
     controller = Controller(arm, parameters=arm.parameters, now=client.now())
     shared = SharedController(controller, ServedControl(client))
     return TerminalRoom(shared, client, Files(directory, examples=examples()), f"{version}, VAL-II")

@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 
 from interfaces.val2.values import PrecisionPoint, Transformation
-from robots.puma560 import parameters
-from vrs.model import Array, Limits, frozen_array
+from robots.puma560 import Puma560, parameters
+from robots.robot import Robot
+from vrs.model import Array, Limits, frozen_array, home
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,8 +28,10 @@ class ArmConventions:
     """VAL's joint values less the model's [deg]."""
     ready: PrecisionPoint
     nest: PrecisionPoint
-    words: tuple[tuple[str, str], ...]
-    """Pairs of words of its configurations."""
+    words: tuple[tuple[str, str], ...] = ()
+    """Pairs of words of its configurations; none where it has no names of them."""
+    names: tuple[str, ...] = ()
+    """Of its joints, where they have any beside their numbers."""
 
     def point(self, q: Array, limits: Limits) -> PrecisionPoint:
         """VAL's joint values [deg] of joints [rad], (6,), on the turn on which they stand within the limits."""
@@ -44,7 +47,8 @@ class ArmConventions:
         """Of each joint what VAL's value is more than the model's, and a turn that it's less by [deg]."""
         lows = np.degrees(limits.q_min).tolist()
         return [
-            (offset, 360.0 if low + offset > 0.0 else 0.0) for low, offset in zip(lows, self.offsets, strict=True)
+            (offset, 360.0 if offset and low + offset > 0.0 else 0.0)
+            for low, offset in zip(lows, self.offsets, strict=True)
         ]
 
     def flange_at(self, X: Array) -> Transformation:
@@ -83,3 +87,25 @@ PUMA: Final = ArmConventions(
 )
 """The PUMA 560's: the base frame turned by 180 degrees about the waist, the last link by as much about its own axis
 and at the flange, Lee's joints against the Robotics Toolbox's. NEST is ours: the arm folded over its shoulder."""
+
+
+def conventions_of(robot: Robot) -> ArmConventions:
+    """Those of an arm of six joints that turn.
+
+    But for the PUMA's own they're those of its description: the world is its base frame, joints are as they're
+    described, the hand has the axes of the last link and is where a gripper holds. READY is its pose `ready`, or
+    where it stands at first; NEST its pose `nest`, or READY. It has no words of configurations.
+    """
+    if isinstance(robot.model, Puma560):
+        return PUMA
+    poses, eye = robot.arm.poses, frozen_array(np.eye(4))
+    ready = poses.get("ready", home(robot.arm))
+    nest = poses.get("nest", ready)
+    flange = frozen_array(1000.0 * np.asarray(robot.tool))
+    return ArmConventions(
+        eye, eye, flange, (0.0,) * robot.arm.limits.dof, _degrees(ready), _degrees(nest), names=robot.joints
+    )
+
+
+def _degrees(q: Array) -> PrecisionPoint:
+    return PrecisionPoint(tuple(np.degrees(q).tolist()))

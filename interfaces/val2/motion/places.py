@@ -105,7 +105,8 @@ class Frames:
         except OutOfLimitsError as error:
             limits = self.model.limits
             at, low, high = (self.point(one).joints[error.joint] for one in (q, limits.q_min, limits.q_max))
-            text = f"Jt {error.joint + 1} would be at {at:.6g} deg, allowed are {low:.6g} to {high:.6g}"
+            named = f" ({self.conventions.names[error.joint]})" if self.conventions.names else ""
+            text = f"Jt {error.joint + 1}{named} would be at {at:.6g} deg, allowed are {low:.6g} to {high:.6g}"
             raise location_error(text) from None
 
     def solve(self, location: Location, near: Array, words: tuple[str, ...]) -> Array:
