@@ -92,13 +92,13 @@ def _connected(
     from interfaces import connect
     from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
-    from interfaces.val2.monitor.control import LeaseControl
+    from interfaces.val2.monitor.control import RemoteControl
     from interfaces.val2.motion import arm_for
 
     token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    with connect(url, token=token, name="vrs console") as connection:
+    with connect(url, token=token, name="vrs console", alters=True) as connection:
         what = f"{software()}, connected to {url}"
-        _converse(arm_for(connection, robot), LeaseControl(connection), connection, files, dialect, what)
+        _converse(arm_for(connection, robot), RemoteControl(connection), connection, files, dialect, what)
 
 
 def _converse(

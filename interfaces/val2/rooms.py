@@ -6,8 +6,6 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
-import numpy as np
-
 from interfaces.messages.control import Role
 from interfaces.stream.access import Access
 from interfaces.stream.local import LocalClient
@@ -21,7 +19,6 @@ from interfaces.val2.motion import Arm, SiteRobot, conventions_of
 from interfaces.val2.parser import parse_expression
 from vrs.clock import Clock
 from vrs.model import Array
-from vrs.scheduler import FRESH
 
 if TYPE_CHECKING:
     from interfaces.teleop import OperatorSite
@@ -87,13 +84,7 @@ class TerminalRoom:
         Raises:
             ValError: If none does, or it can't be.
         """
-        arm = self._shared.controller.arm
-        if not arm.altering(channel, now=now):
-            raise ValError("Path isn't altered", f"no program has ALTER on for channel {channel}")
-        if abs(at - now) > FRESH:
-            raise ValError("Illegal value", f"a correction is for now, within {FRESH:g} s")
-        values = (*(1000.0 * offset[:3]).tolist(), *np.degrees(offset[3:]).tolist())
-        outcome = arm.correct(values, given=at, now=now)
+        outcome = self._shared.correct(channel, offset, at, now=now)
         self.soon()
         if outcome is None or outcome.receipt is None or outcome.reason:
             raise ValError("Path can't be altered so", "" if outcome is None else outcome.reason)
