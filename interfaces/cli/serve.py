@@ -406,7 +406,7 @@ async def _serve(
             if one.val_files is not None:
                 assert isinstance(operator.twins, ArmTwins)
                 client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
-                room = served_room(client, operator.twins.operator, one.val_files, software())
+                room = served_room(client, operator.twins.operator, one.robot, one.val_files, software())
                 operator.hub.alterer = room
                 routes.append(PageTerminalServer(room, access).route)
                 if one.val_port is not None:

@@ -268,6 +268,27 @@ function checkProblem(m) {
   return m;
 }
 
+/** Either side: Correct the path that a program alters on a channel. The answer is a `Corrected` or a `Problem`. The server hands it on to a client with `alters` that has control, which answers the server in its turn. */
+function checkPathCorrection(m) {
+  map(m, "correct");
+  if (m.type !== undefined && m.type !== "correct") fail("correct", "correct");
+  whole(m.number, 1, WHOLE, "correct.number"); // The sender's own; the answer has it, too.
+  whole(m.channel, 0, 255, "correct.channel"); // Of the program's ALTER.
+  numbers(m.offset, 6, 6, -1e9, 1e9, "correct.offset"); // Translation [m], then rotation vector [rad], (6,): along which axes, and whether it adds up, says ALTER.
+  m.epoch = m.epoch === undefined || m.epoch === null ? null : like(m.epoch, /^[1-9][0-9]{0,19}$/, "correct.epoch"); // Of who has control, or shares it; others may correct a program of a client with `alters`.
+  m.at = m.at === undefined || m.at === null ? null : real(m.at, -1e9, 1e9, "correct.at"); // For when it's meant [s], within 0.2 s of now; absent: for when it comes.
+  return m;
+}
+
+/** Either side: A correction is on the path. */
+function checkCorrected(m) {
+  map(m, "corrected");
+  if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
+  whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
+  m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
+  return m;
+}
+
 /** Joint limits, each of shape (n,); of prismatic joints in m for rad. */
 function checkLimits(m) {
   map(m, "Limits");
@@ -391,15 +412,6 @@ function checkNetwork(m) {
   m.offset = m.offset === undefined || m.offset === null ? null : real(m.offset, -1e9, 1e9, "network.offset"); // D, where it's fixed [s]; absent: it adapts, or isn't known.
   m.advice = m.advice === undefined ? "" : text(m.advice, 0, 2000, "network.advice"); // What is likely to go wrong under these conditions, for people.
   m.answers = m.answers === undefined || m.answers === null ? null : whole(m.answers, 1, WHOLE, "network.answers"); // Number of the receiver's request that this answers.
-  return m;
-}
-
-/** Server: A correction is on the path. */
-function checkCorrected(m) {
-  map(m, "corrected");
-  if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
-  whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
-  m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
   return m;
 }
 
@@ -654,11 +666,12 @@ const CHECKS = new Map([
   ["ping", checkPing],
   ["pong", checkPong],
   ["problem", checkProblem],
+  ["correct", checkPathCorrection],
+  ["corrected", checkCorrected],
   ["welcome", checkWelcome],
   ["lease", checkLease],
   ["state", checkState],
   ["network", checkNetwork],
-  ["corrected", checkCorrected],
   ["present", checkPresent],
   ["mobile-welcome", checkMobileWelcome],
   ["postures", checkPostures],
@@ -668,7 +681,7 @@ const CHECKS = new Map([
 ]);
 
 /** Types of messages that bear the epoch of the lease under which they're sent. */
-export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "correct", "task"]);
+export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "task"]);
 
 const told = new Set();
 
