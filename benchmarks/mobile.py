@@ -17,6 +17,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
+from robots.bullet.vehicle import BulletVehicle
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Senses, SonarModel
@@ -39,7 +40,8 @@ def circle(body: MobileRobot) -> None:
 
 def bare_steps(body: MobileBody, count: int) -> None:
     """Step a robot's world without anything around it."""
-    step = body.world.bullet.stepSimulation
+    assert isinstance(body.vehicle, BulletVehicle)
+    step = body.vehicle.world.bullet.stepSimulation
     for _ in range(count):
         step()
 

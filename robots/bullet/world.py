@@ -21,6 +21,7 @@ from typing_extensions import override
 from robots.bullet.rooms import Block, Column, Room
 from robots.robot import Closing
 from robots.solids import LinkShape
+from robots.vehicle import FLOOR_FRICTION, THING_FRICTION
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
@@ -127,7 +128,7 @@ class RoomBodies:
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
         self.floor = floor = int(bullet.createMultiBody(0.0, shape))
         """PyBullet's id of the floor."""
-        bullet.changeDynamics(floor, -1, lateralFriction=1.0)
+        bullet.changeDynamics(floor, -1, lateralFriction=FLOOR_FRICTION)
         bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL)
         self.names: dict[int, str] = {}
         """Names of things by PyBullet's body ids."""
@@ -204,7 +205,7 @@ class RoomBodies:
     def _stand(self, shape: int, name: str, position: list[float], turn: list[float] | None = None) -> int:
         bullet = self._world.bullet
         body = bullet.createMultiBody(0.0, shape, -1, position, [0.0, 0.0, 0.0, 1.0] if turn is None else turn)
-        bullet.changeDynamics(body, -1, lateralFriction=0.5)
+        bullet.changeDynamics(body, -1, lateralFriction=THING_FRICTION)
         bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY)
         self.names[int(body)] = name
         return int(body)

@@ -1,4 +1,4 @@
-"""CUBO's body in PyBullet, addressed by bindings: names of what an effector moves and of what a sensor measures.
+"""CUBO's body, addressed by bindings: names of what an effector moves and of what a sensor measures.
 
 It plans nothing and decides nothing: a thin client's body.
 """
@@ -158,9 +158,7 @@ class CuboBody(MobileBody):
 
     def angles(self) -> Values:
         """Angles of the right arm, the left arm and the head [rad]."""
-        joints = [self._joint(k) for k in range(len(p.CUBO.limbs))]
-        states = self.world.bullet.getJointStates(self.body_id, joints)
-        return tuple(float(state[0]) for state in states)
+        return self.vehicle.limbs()
 
     @property
     def step(self) -> float:
@@ -190,18 +188,7 @@ class CuboBody(MobileBody):
             self._events.append("bumper")
         self._touched = bool(self.touching)
 
-    def _joint(self, limb: int) -> int:
-        return 2 + len(p.CUBO.casters) + limb
-
     def _swing(self, limb: Limb, number: int, values: Values) -> None:
         speed = (abs(values[1]) if len(values) > 1 else 0.0) or limb.speed
-        self.world.bullet.setJointMotorControl2(
-            self.body_id,
-            self._joint(number),
-            self.world.bullet.POSITION_CONTROL,
-            targetPosition=min(max(values[0], limb.low), limb.high),
-            positionGain=0.2,
-            velocityGain=1.0,
-            force=limb.torque,
-            maxVelocity=min(max(speed, 1e-3), limb.speed),
-        )
+        angle = min(max(values[0], limb.low), limb.high)
+        self.vehicle.swing(number, angle, min(max(speed, 1e-3), limb.speed))

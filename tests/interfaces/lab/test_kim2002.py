@@ -23,8 +23,9 @@ from interfaces.lab.papers import papers
 from interfaces.messages.jobs import JobStage
 from robots.bullet.rooms import Person
 from robots.ipr.parameters import IPR
-from robots.mobile.body import Cargo, MobileBody
+from robots.mobile.body import MobileBody
 from robots.mobile.robot import Collision, place
+from robots.vehicle import Cargo
 from vrs.errors import InvalidValueError
 
 

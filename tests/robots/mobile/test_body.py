@@ -12,6 +12,7 @@ import trimesh
 
 from robots import ipr
 from robots.bullet.rooms import read_room
+from robots.bullet.vehicle import BulletVehicle
 from robots.bullet.world import LostError, WorldClosedError
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
@@ -135,8 +136,10 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
     assert part.limits == model.limits
     # PyBullet has what it was given: it drops inertias silently when a call names damping, too.
     with MobileBody(chassis, START, senses=BLIND) as robot:
-        bullet = robot.world.bullet
-        told = [bullet.getDynamicsInfo(robot.body_id, j) for j in range(-1, bullet.getNumJoints(robot.body_id))]
+        vehicle = robot.vehicle
+        assert isinstance(vehicle, BulletVehicle)
+        bullet, number = vehicle.world.bullet, vehicle.body
+        told = [bullet.getDynamicsInfo(number, j) for j in range(-1, bullet.getNumJoints(number))]
     assert sum(row[0] for row in told) == pytest.approx(total, rel=1e-9)
     assert sorted(told[0][2]) == pytest.approx(sorted(np.linalg.eigvalsh(inertia)), rel=1e-9)
     spin = part.wheel_mass * part.wheel_radius**2 / 2 + part.gear**2 * part.rotor
@@ -149,8 +152,8 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
 def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(chassis: Chassis) -> None:
     with MobileBody(chassis, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.3, 0.0, 480)
-        bullet = body.world.bullet
-        points = bullet.getContactPoints(bodyA=body.body_id)
+        assert isinstance(body.vehicle, BulletVehicle)
+        points = body.vehicle.world.bullet.getContactPoints(bodyA=body.vehicle.body)
         weight = body.chassis.mass * 9.81
         assert sum(point[9] for point in points) == pytest.approx(weight, rel=0.01)
         assert sum(wheel.load for wheel in body.wheels) > 0.6 * weight
@@ -326,7 +329,6 @@ def test_a_closed_robot_is_of_no_use() -> None:
     body = MobileBody(MICRO, START)
     body.close()
     body.close()
-    assert body.world.closed
     with pytest.raises(WorldClosedError):
         body.follow(0.1, 0.0)
 
