@@ -19,6 +19,8 @@ Posture = tuple[float, float, float]
 """x, y [m], heading [rad]."""
 HOLD_TIME: Final = 0.03
 """How fast wheels' servos make up for the angle that a load took from them [s]; the LM629 regulates angles, too."""
+LIMB_GAIN: Final = 0.2
+"""Share of the way to its angle that a limb's servo goes in a step."""
 BODY_FRICTION: Final = 0.3
 """Of the box; two things that touch have the product of their coefficients."""
 FLOOR_FRICTION, THING_FRICTION = 1.0, 0.5

@@ -17,15 +17,25 @@ from robots.bullet.rooms import Room
 from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, RoomBodies, World
 from robots.chain import quaternion
 from robots.robot import Closing
-from robots.vehicle import BODY_FRICTION, DRIVES, GAP, HOLD_TIME, Cargo, Pair, Point, Posture, Vehicle, Wheel
+from robots.vehicle import (
+    BODY_FRICTION,
+    DRIVES,
+    GAP,
+    HOLD_TIME,
+    LIMB_GAIN,
+    Cargo,
+    Pair,
+    Point,
+    Posture,
+    Vehicle,
+    Wheel,
+)
 from vrs.model import Array
 
 _FREE_SPEED = 1e6
 _FLAT = [0.0, 0.0, 0.0, 1.0]
 _ITERATIONS = 30
 """Most of PyBullet's contact solver in a step; fewer do where it converges."""
-_LIMB_GAIN = 0.2
-"""Share of the way to its angle that a limb's servo goes in a step."""
 
 
 class BulletVehicle(Closing):
@@ -178,7 +188,7 @@ class BulletVehicle(Closing):
     @property
     def changing(self) -> bool:
         """Whether anything in the room ever moves, comes or goes."""
-        return self._room.moving
+        return self._room.changing
 
     def at(self, t: float) -> None:
         """Bring everything in the room to where it is at a time [s]."""
@@ -219,7 +229,7 @@ class BulletVehicle(Closing):
             self._limbs[limb],
             self.world.bullet.POSITION_CONTROL,
             targetPosition=angle,
-            positionGain=_LIMB_GAIN,
+            positionGain=LIMB_GAIN,
             velocityGain=1.0,
             force=self._vehicle.limbs[limb].resistance,
             maxVelocity=speed,
