@@ -16,6 +16,7 @@ from robots.cubo import parameters as p
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.mobile.position import FusedPosition, TruePosition
+from robots.simulated import WORLDS
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import clipped
@@ -45,6 +46,7 @@ class CuboBody(MobileBody):
         self,
         posture: ArrayLike | None = None,
         *,
+        world: str = next(iter(WORLDS)),
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
@@ -55,6 +57,7 @@ class CuboBody(MobileBody):
 
         Args:
             posture: (x, y, θ) [m, m, rad]; where the room says, unless given.
+            world: One of `robots.simulated.WORLDS`.
             room: A room, or the name of one that comes with the package; only a floor, unless given.
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
@@ -76,7 +79,9 @@ class CuboBody(MobileBody):
         self._touched = False
         self._sounding = 0.0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
-        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
+        super().__init__(
+            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses
+        )
         self._position = TruePosition(self) if exact else FusedPosition(self)
         self._posture = self._position.posture()
 

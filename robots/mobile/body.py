@@ -9,17 +9,25 @@ Cargo lies on a robot and is held by friction alone: a book that somebody puts t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from robots.bullet.vehicle import BulletVehicle
+from robots.base import PERIOD
+from robots.bullet.rooms import Room
 from robots.bullet.world import LostError, WorldClosedError
 from robots.chain import Inertia, together
-from robots.mobile.chassis import Chassis, MobileReality
-from robots.mobile.robot import MobileRobot
+from robots.mobile.chassis import Chassis, MobileReality, Senses
+from robots.mobile.robot import BareBody, MobileRobot
+from robots.robot import BARE
+from robots.simulated import WORLDS
 from robots.vehicle import Cargo, RigidVehicle, Vehicle, VehiclePart, Wheel
 from vrs.errors import InvalidValueError
+from vrs.mobile import DriveLimits
 from vrs.model import Array
 
 _BALL_FRICTION = 0.02
@@ -97,17 +105,62 @@ def _wheels(chassis: Chassis, reality: MobileReality, radii: tuple[float, float]
     return parts
 
 
+def bodies_of(chassis: Chassis, **given: Any) -> dict[str, Callable[..., MobileRobot]]:
+    """Return what can be real of a robot, by name: its body in each world of physics, and the bare one.
+
+    Args:
+        chassis: What it is.
+        **given: What else both bodies take, as limits.
+    """
+    simulated = {world: partial(MobileBody, chassis, world=world, **given) for world in WORLDS}
+    return {**simulated, BARE: partial(BareBody, chassis, **given)}
+
+
 class MobileBody(MobileRobot):
     """A robot with mass, tyres and casters in a world of its own; use it as a context manager."""
 
     _STEP = 1 / 240
 
+    def __init__(
+        self,
+        chassis: Chassis,
+        posture: ArrayLike | None = None,
+        *,
+        world: str = next(iter(WORLDS)),
+        room: Room | str | None = None,
+        reality: MobileReality | None = None,
+        rng: np.random.Generator | int = 0,
+        limits: DriveLimits | None = None,
+        senses: Senses | None = None,
+        period: float = PERIOD,
+    ) -> None:
+        """Put a robot into a room, at rest; the other arguments and errors are those of `MobileRobot`.
+
+        Args:
+            chassis: What it is.
+            posture: Where.
+            world: One of `robots.simulated.WORLDS`.
+            room: Of the robot.
+            reality: How real it is.
+            rng: What slips and noise are drawn from, or a seed.
+            limits: What commands must keep to.
+            senses: What it senses with.
+            period: What `follow` goes on by [s].
+
+        Raises:
+            InvalidValueError: If the world isn't installed, too.
+            LostError: If it falls over where it stands.
+        """
+        self._make = WORLDS[world].vehicle
+        self._vehicle: RigidVehicle | None = None
+        super().__init__(
+            chassis, posture, room=room, reality=reality, rng=rng, limits=limits, senses=senses, period=period
+        )
+
     def _begin(self) -> None:
         reality, start, train = self.reality, self.truth, self._train
         vehicle = vehicle_of(self.chassis, reality, train.radii, train.base)
-        self._vehicle: RigidVehicle | None = BulletVehicle(
-            vehicle, self.room, start, gravity=reality.gravity, dt=reality.dt
-        )
+        self._vehicle = self._make(vehicle, self.room, start, gravity=reality.gravity, dt=reality.dt)
         self._target_right = self._target_left = 0.0
         self._tyres = (0.0, 0.0)
         self._angles = (0.0, 0.0)
