@@ -52,13 +52,15 @@ def measure(blocks: int = 40) -> dict[str, float]:
     blind = Senses(sonar=None, camera=None)
     found: dict[str, list[float]] = {}
     with (
-        MobileBody(IPR, START, room="furnished", rng=1) as simulated,
-        MobileBody(MICRO, START, room="furnished", rng=1) as micro,
-        MobileBody(IPR, START, room="furnished", rng=1) as stepped,
+        MobileBody(IPR, START, room="furnished", rng=1, world="bullet") as simulated,
+        MobileBody(MICRO, START, room="furnished", rng=1, world="bullet") as micro,
+        MobileBody(IPR, START, room="furnished", rng=1, world="mujoco") as mujoco,
+        MobileBody(IPR, START, room="furnished", rng=1, world="bullet") as stepped,
     ):
         bodies: dict[str, MobileRobot] = {
             "simulated": simulated,
             "micro": micro,
+            "mujoco": mujoco,
             "bare": BareBody(IPR, START, room="furnished", rng=1, senses=blind),
             "bare_sonar": BareBody(IPR, START, room="furnished", rng=1, senses=sonar),
         }
@@ -197,6 +199,7 @@ def part() -> Part:
         (
             row("IPR in PyBullet, sonars and camera", "simulated", 20.0, share),
             row("micro-robot in PyBullet, sonars and camera", "micro", 20.0),
+            row("IPR in MuJoCo, sonars and camera", "mujoco", 10.0),
             row("bare robot", "bare", 500.0),
             row("bare robot with sonars", "bare_sonar", None),
             *(row(f"a run by {name}, bare, with link and metrics", name, 250.0) for name in ARCHITECTURES),
