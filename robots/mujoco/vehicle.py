@@ -151,7 +151,10 @@ class MujocoVehicle(Closing):
         for k, part in enumerate(vehicle.parts):
             body = model.body(f"part {k}")
             body.mass, body.ipos, body.inertia = part.mass, part.centre, part.inertia
+        # With it the state is that of the reference.
+        q, qd = data.qpos.copy(), data.qvel.copy()
         mujoco.mj_setConst(model, data)
+        data.qpos, data.qvel = q, qd
         # What the solver takes for small is a share of this; shafts don't count.
         model.stat.meaninertia = vehicle.rigid.mass
         mujoco.mj_kinematics(model, data)

@@ -52,7 +52,11 @@ def test_the_scenario_is_played_to_its_end() -> None:
 @pytest.mark.parametrize(("friction", "stays"), [(0.5, True), (0.005, False)])
 def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bool, world: str) -> None:
     with MobileBody(IPR, (0.0, 0.0, 0.0), world=world) as body:
+        body.drive(0.5, 0.0, 240)
+        body.drive(0.0, 0.0, 240)
+        at, _ = body.vehicle.pose()
         body.load(Cargo(friction=friction))
+        assert np.array_equal(body.vehicle.pose()[0], at)
         for k in range(60):
             body.follow(0.5 if k % 20 < 10 else 0.0, 0.7 if k % 20 < 10 else -0.7)
         ((x, y, z),) = body.cargo
