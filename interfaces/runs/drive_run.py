@@ -35,7 +35,7 @@ class DriveCase:
     delay: str = "mon"
     """Profile of either direction, as the command line spells it."""
     robot: str = USUAL_BASE
-    """A mobile robot, as `robots.load` finds it, or `bare`."""
+    """A mobile robot, as `robots.load` finds it, and `@BODY` for another body than its usual one; or `bare`."""
     operator: str = "mixed"
     seed: int = 0
     length: Annotated[float, within(1.0, 3600.0, "s")] = 120.0
@@ -66,7 +66,11 @@ class DriveCase:
         """
         if self.robot == BARE:
             return load(USUAL_BASE), BARE
-        return load(self.robot) if self.known is None else self.known, ""
+        name, at, body = self.robot.rpartition("@")
+        if not at or not body.isidentifier():
+            name, body = self.robot, ""
+        robot = load(name) if self.known is None else self.known
+        return robot, body and robot.body_name(body)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))

@@ -70,7 +70,7 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     assert set(robot.with_body("mujoco").bodies) == set(robot.bodies)
     assert robot.body_name(EXACT) == robot.body_name(IDEAL) == IDEAL
     assert robot.body(EXACT) is robot.body(IDEAL)
-    with pytest.raises(InvalidValueError, match="one of bullet, bare"):
+    with pytest.raises(InvalidValueError, match="one of bullet, mujoco, bare"):
         robots.load("ipr").body(EXACT)
 
 
