@@ -62,6 +62,9 @@ def _assumed(found: DescribedRobot) -> Iterator[str]:
     """What was assumed of a robot."""
     keys = dict.fromkeys(re.findall(r"^(\w+) =", "\n".join(found.to_state), re.MULTILINE))
     words = {"tip": "", "tool_speed": "", "tool_turn_speed": "the tool's speeds"}
+    slower = re.search(r"reached in ([\d.]+ s), as the efforts", "\n".join(found.notes))
+    if slower:
+        words["acceleration"] = f"`acceleration` (largest speed in {slower[1]}, by the efforts)"
     yield from (said for key in keys if (said := words.get(key, f"`{key}`")))
     for what, said in SAID.items():
         names = [re.split(rf": {said}", note)[0] for note in found.notes if re.search(rf": {said}", note)]
