@@ -12,6 +12,7 @@ import pytest
 
 import robots
 from robots.robot import EXACT, FOUND, IDEAL, Display, Gripper, HeadCamera, Robot, ThinClient
+from robots.simulated import WORLDS
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import MobileModel
 from vrs.model import RobotModel
@@ -26,7 +27,7 @@ def test_each_robot_is_found_by_its_name_and_stands_where_its_shapes_are_told(na
     assert robot.appearance is not None
     where = np.zeros(robot.arm.limits.dof if name in ARMS else 3)
     assert robot.appearance.poses(where).shape == (len(robot.appearance.shapes()), 4, 4)
-    assert next(iter(robot.bodies)) == "bullet"
+    assert next(iter(robot.bodies)) == (next(iter(WORLDS)) if name in ARMS else "bullet")
     assert isinstance(robot.model, RobotModel if name in ARMS else MobileModel)
 
 
