@@ -40,15 +40,14 @@ export function App({ station }) {
     ${at("nowhere")}`;
 }
 
-/** A panel's place: its component, or the element that its `mount` fills. */
+/** A panel's place. The camera's picture stands beside the stick: one drives by it. */
 function Card({ station, panel: { name, place } }) {
   const { layout } = station;
   const module = layout.modules[name];
-  const tabbed = place === "side" ? { role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: layout.shown !== name } : {};
-  const box = useRef(null);
-  useEffect(() => module?.mount?.(station, box.current), [module]);
+  const shown = layout.shown === name || (name === "camera" && layout.shown === "drive");
+  const tabbed = place === "side" ? { role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: !shown } : {};
   return html`<div id=${`card-${name}`} class="card" ...${tabbed}>
-    <div id=${`panel-${name}`} class=${`panel panel-${name}`} ref=${box}>${module?.Panel && html`<${module.Panel} station=${station} />`}</div></div>`;
+    <div id=${`panel-${name}`} class=${`panel panel-${name}`}>${module?.Panel && html`<${module.Panel} station=${station} />`}</div></div>`;
 }
 
 function Tabs({ station: { layout, drives } }) {

@@ -104,7 +104,7 @@ class Page:
         try:
             until(holds)
         except AssertionError:
-            said = [self.page.locator(name).text_content() for name in ("#bar-panels", "#receipts", "#alert")]
+            said = self.page.locator("#bar-panels, #receipts, .refused, #alert").all_text_contents()
             raise AssertionError(said) from None
 
     def rest(self) -> None:
