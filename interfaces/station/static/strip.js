@@ -1,7 +1,7 @@
 // The timeline as a strip: what was to the left, what is planned to the right, and what may be changed by hand.
 import { Marks, Moves } from "./bars.js";
 import { movesBetween } from "./moves.js";
-import { Loader, planned, saveMoves } from "./planfile.js";
+import { isPlanned, Loader, savePlan } from "./planfile.js";
 import { View } from "./timeview.js";
 import { clockText, html, Icon, isTyping, observed, useComputed, useEffect, useMemo, useOn, useRef, useState } from "./ui.js";
 
@@ -177,8 +177,8 @@ function Tools({ strip }) {
     ${tool("undo", "undo", "Take back the newest command", () => session.order(null), "Undo", { why: idle })}
     ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
     <span class="gap"></span>
-    ${tool("save", "download", "Save what is planned to a plan file: the moves, without vias and roundings", () => saveMoves(station), "Save",
-      { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
+    ${tool("save", "download", "Save what is planned to a plan file", () => savePlan(station), "Save",
+      { why: isPlanned(session) ? "" : "nothing is planned that could be saved" })}
     <${Loader} strip=${strip} tool=${tool} />
     <span class="gap"></span>
     ${tool("delete", "delete", "Take the chosen move out of the plan", () => strip.remove(chosen), "Delete", { why })}
