@@ -113,13 +113,13 @@ class Strip {
   }
 
   /** Go on with the time; whether something is to be put in its place. */
-  advance(at, width) {
+  advance(at, track) {
     const { session, view } = this;
     const { now, timeline } = session;
     if (now === null || !timeline || document.hidden || (at - this.drawnAt < BETWEEN && !this.stale)) return false;
     this.play(this.played ? (at - this.drawnAt) / 1000 : 0);
     [this.drawnAt, this.played] = [at, this.plays];
-    if (view.advance(now, width) || this.stale || now >= this.due) this.draw(timeline, now);
+    if (view.advance(now, track.clientWidth) || this.stale || now >= this.due) this.draw(timeline, now);
     return true;
   }
 
@@ -202,7 +202,7 @@ function Track({ strip }) {
   useEffect(() => {
     let frame = requestAnimationFrame(function next(at) {
       frame = requestAnimationFrame(next);
-      if (strip.advance(at, track.current.clientWidth)) place();
+      if (strip.advance(at, track.current)) place();
     });
     return () => cancelAnimationFrame(frame);
   }, []);
