@@ -27,16 +27,16 @@ export function App({ station }) {
   const at = (place) => panels.filter((panel) => panel.place === place)
     .map((panel) => html`<${Card} key=${panel.name} station=${station} panel=${panel} />`);
   return html`
-    <div id="bar"><h1 class="name">VRS teleop</h1>
+    <header id="bar"><h1 class="name">VRS teleop</h1>
       ${robots.length > 0 && html`<nav id="robots" aria-label="Robots">
         ${robots.map(([name, page, here]) => html`<a href=${page} aria-current=${here && "page"}>${name}</a>`)}</nav>`}
-      <div id="bar-panels">${at("header")}</div></div>
-    <div id="work">
+      <div id="bar-panels">${at("header")}</div></header>
+    <main id="work">
       <div id="pane-box">${at("pane")}</div>
       <${Splitter} />
       <div id="side"><${Tabs} station=${station} /><div id="tab-panels">${at("side")}</div></div>
-    </div>
-    <div id="strip-box">${at("strip")}</div>
+    </main>
+    <section id="strip-box" aria-label="What was and what is planned">${at("strip")}</section>
     ${at("nowhere")}`;
 }
 

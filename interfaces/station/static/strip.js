@@ -259,7 +259,8 @@ function Track({ strip }) {
   return html`<div class="track" id="track" role="group" aria-label="Timeline" ref=${track} onWheel=${turn} onPointerDown=${press}
     onPointerMove=${(event) => track.current.hasPointerCapture(event.pointerId) && scrub(event)}>
     <div class="past" ref=${past}></div>
-    <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0" ref=${slider} onKeyDown=${key}></div>
+    <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0"
+      aria-valuenow="0" ref=${slider} onKeyDown=${key}></div>
     <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Moves} strip=${strip} /></div>
     <div class="at real" ref=${real}><span>real</span></div><div class="at now" ref=${now}><span>now</span></div>
     <div class="at cursor" hidden ref=${cursor}></div></div>`;

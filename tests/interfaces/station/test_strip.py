@@ -181,6 +181,8 @@ def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     assert spans[2][0] > was[1][1]
     assert spans[3][0] - spans[2][0] == pytest.approx(was[1][0] - was[0][0], abs=1e-6)
     page.page.set_input_files("#plan-file", path)
+    page.page.wait_for_selector("#load-replace")
+    page.accessible()
     page.page.click("#load-replace")
     until(
         lambda: len(scheduled(page)) == 1 or (len(scheduled(page)) == 2 and sorted(scheduled(page).values()) != was)
