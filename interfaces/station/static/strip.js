@@ -1,5 +1,5 @@
 // The timeline as a strip: what was to the left, what is planned to the right, and what may be changed by hand.
-import { Marks, Moves } from "./bars.js";
+import { Grips, Marks, Moves } from "./bars.js";
 import { movesBetween } from "./moves.js";
 import { isPlanned, Loader, savePlan } from "./planfile.js";
 import { View } from "./timeview.js";
@@ -261,7 +261,8 @@ function Track({ strip }) {
     <div class="past" ref=${past}></div>
     <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0"
       aria-valuenow="0" ref=${slider} onKeyDown=${key}></div>
-    <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Moves} strip=${strip} /></div>
+    <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Grips} strip=${strip} />
+      <${Moves} strip=${strip} /></div>
     <div class="at real" ref=${real}><span>real</span></div><div class="at now" ref=${now}><span>now</span></div>
     <div class="at cursor" hidden ref=${cursor}></div></div>`;
 }

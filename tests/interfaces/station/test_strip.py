@@ -155,6 +155,20 @@ def test_undo_is_redone(page: Page) -> None:
     clear(page)
 
 
+def test_what_the_hand_is_told_stands_on_everybodys_strip(browser: Any, server: Child, page: Page) -> None:
+    page.take_control().rest()
+    with paged(browser, station(server)) as second:
+        second.open()
+        page.page.click("#hand-close")
+        for seen in (page, second):
+            until(lambda seen=seen: seen.page.locator(".grip").count() == 1)
+            assert "Close the hand, 0:" in (seen.page.locator(".grip").get_attribute("aria-label") or "")
+        page.shoot("grip")
+        page.page.click("#hand-open")
+        until(lambda: second.page.locator(".grip").count() == 2)
+    page.page.click("#give")
+
+
 def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     page.take_control().rest()
     says(page, "#save", "nothing is planned")
