@@ -415,7 +415,9 @@ async def _serve(
                 if one.val_port is not None:
                     val_room = room
             if not one.robot.is_base:
-                routes += Plans(one.robot.arm, access, operator.clock).routes
+                journal = operator.twins.site.journal
+                assert journal is not None
+                routes += Plans(journal, access, operator.clock).routes
                 routes += Poses(one.robot.arm, one.recordings, access, operator.clock).routes
             routes += _station(one, serving, taught=taught is not None).routes
             if one.folder:

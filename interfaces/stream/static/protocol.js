@@ -71,8 +71,6 @@ function map(x, where, check) {
 const STATUS = new Set(["accepted", "postponed", "rejected"]);
 const REFUSAL_CODE = new Set(["other", "overruled", "not-following"]);
 const FRAME_STATUS = new Set(["predicted", "confirmed", "falsified"]);
-const MOTION = new Set(["joint", "line"]);
-const PROFILE = new Set(["parabolic", "jerk-limited"]);
 const PROBLEM_CODE = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
 const LEASE_STATE = new Set(["free", "held", "ending"]);
 const LEASE_END = new Set(["released", "expired", "taken over"]);
@@ -163,9 +161,7 @@ function checkCommandName(m) {
   real(m.t, -1e9, 1e9, "CommandName.t"); // From this session time on [s]: steering goes one way, then another.
   text(m.kind, 0, 200, "CommandName.kind"); // Type of the command.
   m.label = m.label === undefined ? "" : text(m.label, 0, 60, "CommandName.label"); // As the order said.
-  m.speed = m.speed === undefined ? 1.0 : real(m.speed, 0, 1, "CommandName.speed"); // Of a move, as it was commanded; so are motion and profile.
-  m.motion = m.motion === undefined ? "joint" : word(m.motion, MOTION, "CommandName.motion");
-  m.profile = m.profile === undefined ? "parabolic" : word(m.profile, PROFILE, "CommandName.profile");
+  m.speed = m.speed === undefined ? 1.0 : real(m.speed, 0, 1, "CommandName.speed"); // Of a move, as it was commanded.
   return m;
 }
 
