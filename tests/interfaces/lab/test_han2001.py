@@ -34,18 +34,18 @@ def test_a_sine_is_lost_and_the_figure_says_so() -> None:
     # What is received was sent, some time before.
     assert all(np.abs(sent[: k + 1] - there[k]).min() < 1e-12 for k in range(len(t)) if there[k] != 5.0)
     found = information.work(SMALL, "")
-    assert all(claim.holds for claim in found.claims)
+    assert all(claim.met for claim in found.claims)
     assert found.figures[0].svg.startswith("<?xml")
 
 
 def test_a_sine_that_arrives_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(information, "PROFILE", "none")
-    assert [claim.holds for claim in information.work(SMALL, "").claims] == [True, False]
+    assert [claim.met for claim in information.work(SMALL, "").claims] == [True, False]
 
 
 def test_the_modified_filter_saves_what_the_formula_says() -> None:
     found = information.work_filter(SMALL, "")
-    assert found.claims[0].holds
+    assert found.claims[0].met
     assert information.last_output(7, 0.1) == pytest.approx(0.7)
 
 
@@ -93,7 +93,7 @@ def concluded(
 
 
 def test_claims_hold_where_the_figures_say_so() -> None:
-    assert [claim.claim for claim in concluded(GOOD).values() if not claim.holds] == []
+    assert [claim.claim for claim in concluded(GOOD).values() if not claim.met] == []
 
 
 @pytest.mark.parametrize(
@@ -112,12 +112,12 @@ def test_claims_hold_where_the_figures_say_so() -> None:
     ],
 )
 def test_and_don_t_where_they_say_otherwise(who: str, instead: ArchitectureResult, said: str) -> None:
-    failed = [claim.claim for claim in concluded(GOOD | {who: instead}).values() if not claim.holds]
+    failed = [claim.claim for claim in concluded(GOOD | {who: instead}).values() if not claim.met]
     assert any(said in claim for claim in failed), failed
 
 
 def failed(runs: dict[str, ArchitectureResult], others: dict[str, ArchitectureResult] | None = None) -> set[str]:
-    return {text for text, claim in concluded(runs, others).items() if not claim.holds}
+    return {text for text, claim in concluded(runs, others).items() if not claim.met}
 
 
 def test_each_network_has_its_own_bar_of_the_time_difference() -> None:
@@ -155,7 +155,7 @@ def test_a_seed_counts_once_however_many_networks_it_ran_under() -> None:
     claim = next(one for text, one in found.items() if text.startswith("III's path error stays small"))
     # Of two seeds it's the range: each counts once.
     assert claim.interval == pytest.approx((6.0, 30.0))
-    assert not claim.holds
+    assert not claim.met
 
 
 def test_the_paper_is_in_the_list() -> None:

@@ -194,10 +194,10 @@ def concluded(bad):
 
 
 def test_claims_hold_as_the_figures_say():
-    assert all(claim.holds and claim.measured == 1.0 for claim in concluded(0).claims)
+    assert all(claim.met and claim.measured == 1.0 for claim in concluded(0).claims)
     findings = concluded(1)
     assert len(findings.claims) == 4
-    assert not any(claim.holds for claim in findings.claims)
+    assert not any(claim.met for claim in findings.claims)
     assert findings.claims[0].measured == pytest.approx(0.45)
     table = next(table for table in findings.tables if table.name == "ipr_paths")
     assert table.rows[0][-1] == "limit cycle 10"
@@ -208,10 +208,10 @@ def test_shorter_paths_are_claimed_as_they_are():
     runs = {NetworkControl.DIRECT: (GOOD["without"],) * 10, NetworkControl.NETWORK: (GOOD["behind"],) * 10}
     paths = [PathSuccess(7.0, GOOD["ideal"], runs, {})] * PATHS
     arriving = [PathSuccess(6.1, GOOD["ideal"], runs | {NetworkControl.DIRECT: (GOOD["behind"],) * 10}, {})] * 2
-    assert success.conclude_shorter(SMALL, tuple(paths)).claims[0].holds
+    assert success.conclude_shorter(SMALL, tuple(paths)).claims[0].met
     findings = success.conclude_shorter(SMALL, tuple(paths[2:] + arriving))
     assert findings.claims[0].measured == pytest.approx(0.9)
-    assert not findings.claims[0].holds
+    assert not findings.claims[0].met
     assert findings.claims[0].interval == pytest.approx((0.9, 0.9))
     # A network of ten that fails on all paths: what is uncertain is how many such networks are drawn.
     quick = runs | {NetworkControl.DIRECT: (GOOD["behind"], *(GOOD["without"],) * 9)}
@@ -250,7 +250,7 @@ def test_other_controllers_go_behind_it():
         else:
             results.append(results[-1])
     found = wrapping.conclude(SMALL, tuple(results))
-    assert all(claim.holds for claim in found.claims)
+    assert all(claim.met for claim in found.claims)
     assert len(found.tables[0].rows) == 3 * len(wrapping.CASES)
 
 
@@ -266,11 +266,11 @@ def test_the_gains_claims_hold(monkeypatch):
     monkeypatch.setattr(gain, "GUARDED", 20_000)
     monkeypatch.setattr(gain, "RAW", gain.RAW.__class__(formulation="raw", epochs=10, factors=51))
     found = gain.work(SMALL, "")
-    assert [claim.claim for claim in found.claims if not claim.holds] == []
+    assert [claim.claim for claim in found.claims if not claim.met] == []
     assert len(found.claims) == 10
     raw = [row for row in found.tables[0].rows if row[0].startswith("the paper's")]
     assert all(row[4] > 0.1 for row in raw)
-    assert found.timings[0].holds
+    assert found.timings[0].met
 
 
 def test_the_gains_claims_fail_where_it_is_off_and_name_percent():
@@ -278,7 +278,7 @@ def test_the_gains_claims_fail_where_it_is_off_and_name_percent():
     assert [claim.measured for claim in gain.accuracy_claims("one", {"uniform": good})] == pytest.approx([0.1, 0.5])
     for bad, holds in (({"p99": 1.01e-3}, [False, True]), ({"largest": 5.01e-3}, [True, False])):
         claims = gain.accuracy_claims("one", {"uniform": good, "other": good | bad})
-        assert [claim.holds for claim in claims] == [True, True, *holds]
+        assert [claim.met for claim in claims] == [True, True, *holds]
 
 
 def test_a_guard_that_lets_too_much_pass_fails(monkeypatch):
@@ -287,17 +287,17 @@ def test_a_guard_that_lets_too_much_pass_fails(monkeypatch):
     monkeypatch.setattr(gain, "step_time", lambda _: 51e-6)
     monkeypatch.setattr(gain, "guard", lambda _, given, __: (1.0 + 1e-8, 0.5))
     found = gain.work(SMALL, "")
-    assert ["J / ε − 1" in claim.claim for claim in found.claims] == [not claim.holds for claim in found.claims]
-    assert not found.timings[0].holds
+    assert ["J / ε − 1" in claim.claim for claim in found.claims] == [not claim.met for claim in found.claims]
+    assert not found.timings[0].met
     assert found.timings[0].measured == pytest.approx(51.0)
 
 
 def test_a_controller_that_is_no_better_behind_the_middleware_fails():
     runs = {"without": (GOOD["without"],) * 4, "with": (GOOD["behind"],) * 4}
-    assert wrapping.wrapping_claim("ipr/one", runs, 0).holds
+    assert wrapping.wrapping_claim("ipr/one", runs, 0).met
     assert wrapping.wrapping_claim("ipr/one", runs, 0).measured == pytest.approx(0.2)
     worse = (*(GOOD["behind"],) * 3, GOOD["behind"]._replace(error=0.4))
-    assert not wrapping.wrapping_claim("ipr/one", runs | {"with": worse}, 0).holds
+    assert not wrapping.wrapping_claim("ipr/one", runs | {"with": worse}, 0).met
 
 
 @pytest.mark.parametrize(("arrivals", "error", "letter"), [
@@ -325,7 +325,7 @@ def test_enough_runs_succeed_by_their_share_not_by_its_interval():
         paths = [PathSuccess(8.5, GOOD["ideal"], some, {})] * many + [PathSuccess(8.5, GOOD["ideal"], runs, {})] * (
             PATHS - many
         )
-        assert success.claim("ipr", NetworkControl.NETWORK, paths, T_PRED, 0).holds is holds
+        assert success.claim("ipr", NetworkControl.NETWORK, paths, T_PRED, 0).met is holds
 
 
 def test_the_paper_is_in_the_list():
