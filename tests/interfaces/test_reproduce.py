@@ -25,7 +25,9 @@ from vrs import Timeline
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=3, runs=2, length=4.0)
-KEYS = {"claim", "source", "expected", "measured", "interval", "holds"}
+KEYS = {
+    "claim", "source", "expected", "measured", "interval", "counterfactual", "met", "verdict", "holds", "ours",
+}  # fmt: skip
 
 
 def double(study: Study, case: str) -> float:
@@ -87,7 +89,8 @@ class TestHouse:
         assert all(set(claim) == KEYS for claim in document["claims"] + document["timings"])
         assert document["claims"][0]["interval"] == [12.0, 12.0]
         assert document["claims"][1] | {"claim": ""} == {
-            "claim": "", "source": "eq. (2)", "expected": 0.0, "measured": "inf", "interval": None, "holds": False,
+            "claim": "", "source": "eq. (2)", "expected": 0.0, "measured": "inf", "interval": None,
+            "counterfactual": None, "met": False, "verdict": "doesn't hold", "holds": False, "ours": False,
         }  # fmt: skip
         assert document["tables"][0]["rows"] == [[1.0, None]]
 
@@ -98,7 +101,7 @@ class TestHouse:
         for table in rich_tables(reproduce(TOY, Study(seed=3))):
             console.print(table)
         text = console.export_text()
-        assert "NO" in text
+        assert "doesn't hold" in text
         assert "[odd]" in text
 
     def test_all_and_one_and_none(self):
@@ -321,7 +324,7 @@ class TestCommand:
         monkeypatch.setitem(known.__globals__["PAPERS"], "toy", TOY)
         assert exit_status(["reproduce", "toy", "--out", str(tmp_path), "--workers", "1", "--seed", "3"]) == 0
         out = capsys.readouterr().out
-        assert "2 of 3 claims hold." in out
+        assert "The paper's own claims: 1 doesn't hold, 1 not shown by this" in out
         assert "Doesn't hold: it's nothing [odd] (eq. (2))" in out
         assert (tmp_path / "toy.json").exists()
 
