@@ -64,9 +64,9 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        if self.robot == BARE:
-            return load(USUAL_BASE), BARE
-        return load(self.robot) if self.known is None else self.known, ""
+        bare = self.robot == BARE
+        known = load(USUAL_BASE if bare else self.robot) if self.known is None else self.known
+        return known, BARE if bare else ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
