@@ -48,7 +48,7 @@ def reproduce(
         bool, option("--json", "Write PAPER.json on standard output too, a document a paper.")
     ] = False,
 ) -> None:
-    """Measure each claim of a paper: expected, measured, holds; with figures, and all claims on one page."""
+    """Measure each claim of a paper with and without what it claims; with figures, and all claims on one page."""
     from interfaces.lab import Study, papers
     from interfaces.lab.output import to_json, write
     from interfaces.report.claims import read_verdicts, write_claims
@@ -95,6 +95,7 @@ def show(reproduction: Reproduction, path: Path) -> None:
     """Show the claims and tables that fit the console, and how many hold."""
     from rich.console import Console
 
+    from interfaces.lab.claims import Verdict
     from interfaces.lab.output import rich_tables
 
     console = Console()
@@ -103,9 +104,11 @@ def show(reproduction: Reproduction, path: Path) -> None:
             console.print(table)
         else:
             typer.echo(f"{table.title}: {table.row_count} rows, too wide for this console; see {path.name}")
-    failed, found = reproduction.failed, reproduction.findings
-    total = len(found.claims) + len(found.timings)
-    typer.echo(f"{total - len(failed)} of {total} claims hold.")
-    for claim in failed:
+    found = reproduction.findings
+    for whose, ours in (("The paper's own claims", False), ("Ours", True)):
+        of = [claim.verdict for claim in found.claims if claim.is_ours is ours]
+        counts = ", ".join(f"{of.count(verdict)} {verdict}" for verdict in Verdict if verdict in of)
+        typer.echo(f"{whose}: {counts or 'none'}")
+    for claim in reproduction.failed:
         typer.echo(f"Doesn't hold: {claim.claim} ({claim.source})")
     typer.echo(f"Wrote {path} and {len(found.figures)} figures")

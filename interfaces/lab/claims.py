@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from types import SimpleNamespace
 from typing import Annotated, Any, TypeAlias
 
@@ -47,9 +48,33 @@ class Study:
             raise InvalidValueError("length", self.length, "2 to 3600 s")
 
 
+class Verdict(StrEnum):
+    """What a claim's figures say together."""
+
+    HOLDS = "holds"
+    """The figure is as it should be, and without what is claimed it isn't."""
+    FAILS = "doesn't hold"
+    NOT_SHOWN = "not shown by this"
+    """The figure is as it should be, but so it may be without what is claimed, or nothing is beside it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counterfactual:
+    """The same figure without what is claimed: the mechanism switched off, or its obvious rival in its place."""
+
+    what: str
+    """What was switched off, or stands in its place."""
+    measured: float | str
+    """What there was then."""
+    met: bool
+    """Whether the figure may then be as it should be, too."""
+    interval: tuple[float, float] | None = None
+    """Interval over seeds of what was measured; None where nothing is random."""
+
+
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One thing that a paper says or asks for, and what was measured."""
+    """One thing that a paper says or asks for, and what was measured with it and without it."""
 
     claim: str
     """What is claimed, with the unit of what was measured."""
@@ -59,55 +84,102 @@ class Claim:
     """What there should be."""
     measured: float | str
     """What there was."""
-    holds: bool
+    met: bool
     """Whether it's so."""
     interval: tuple[float, float] | None = None
     """Interval over seeds of what was measured, see `interfaces.lab.statistics`; None where nothing is random."""
+    counterfactual: Counterfactual | None = None
+    """What there was without it; None where nothing was put beside it."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the figures say: what would be so without what is claimed isn't shown."""
+        if not self.met:
+            return Verdict.FAILS
+        return Verdict.NOT_SHOWN if self.counterfactual is None or self.counterfactual.met else Verdict.HOLDS
+
+    @property
+    def holds(self) -> bool:
+        """Whether the figures show it."""
+        return self.verdict is Verdict.HOLDS
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether no paper gives the bar, so that it's ours."""
+        return OWN_BAR in self.source
+
+
+Measured: TypeAlias = float | Estimate
+"""A figure, with its interval where it's random."""
+Without: TypeAlias = tuple[str, Measured] | None
+"""What was switched off, or stands in the place of what is claimed, and the same figure then; None for nothing."""
 
 
 def at_most(
-    claim: str, source: str, bar: float, measured: float | Estimate, *, slack: float = 0.0, note: str = ""
-) -> Claim:
-    """A claim that holds if what was measured, or the upper end of its interval, is no more than a bar.
+    claim: str, source: str, bar: float, measured: Measured, without: Without = None, *,
+    slack: float = 0.0, note: str = "",
+) -> Claim:  # fmt: skip
+    """A claim that a figure, and the upper end of its interval, is no more than a bar.
 
     Args:
         claim: What is claimed, with the unit of what was measured.
         source: Where.
         bar: What there should be at most.
         measured: What there was.
+        without: What there was without it; if its interval reaches the bar, the claim isn't shown.
         slack: How far the bar may be passed, by rounding.
         note: What the bar is, said behind it.
     """
-    highest = measured.high if isinstance(measured, Estimate) else measured
-    return _beside(claim, source, f"≤ {_number(bar)}{note}", measured, holds=highest <= bar + slack)
+    return _bounded(claim, source, f"≤ {_number(bar)}{note}", measured, without, lambda end: end <= bar + slack)
 
 
-def at_least(claim: str, source: str, bar: float, measured: float | Estimate, *, note: str = "") -> Claim:
-    """A claim that holds if what was measured, or the lower end of its interval, is no less than a bar."""
-    lowest = measured.low if isinstance(measured, Estimate) else measured
-    return _beside(claim, source, f"≥ {_number(bar)}{note}", measured, holds=lowest >= bar)
+def at_least(
+    claim: str, source: str, bar: float, measured: Measured, without: Without = None, *, note: str = ""
+) -> Claim:
+    """A claim that a figure, and the lower end of its interval, is no less than a bar; see `at_most`."""
+    return _bounded(claim, source, f"≥ {_number(bar)}{note}", measured, without, lambda end: end >= bar)
 
 
-def above(claim: str, source: str, bar: float, measured: float | Estimate) -> Claim:
-    """A claim that holds if what was measured, or the lower end of its interval, is more than a bar."""
-    lowest = measured.low if isinstance(measured, Estimate) else measured
-    return _beside(claim, source, f"> {_number(bar)}", measured, holds=lowest > bar)
+def above(claim: str, source: str, bar: float, measured: Measured, without: Without = None) -> Claim:
+    """A claim that a figure, and the lower end of its interval, is more than a bar; see `at_most`."""
+    return _bounded(claim, source, f"> {_number(bar)}", measured, without, lambda end: end > bar)
 
 
-def below_zero(claim: str, source: str, difference: Estimate) -> Claim:
-    """A claim that holds if the interval of a difference lies below zero."""
-    return _beside(claim, source, "< 0", difference, holds=difference.is_below_zero)
+def below_zero(claim: str, source: str, difference: Estimate, without: Without = None) -> Claim:
+    """A claim that a difference, with all of its interval, lies below zero; see `at_most`."""
+    return _bounded(claim, source, "< 0", difference, without, lambda end: end < 0)
 
 
-def none_of(claim: str, source: str, count: int, *, of: int = 1) -> Claim:
-    """A claim that holds if nothing was counted among something."""
-    return Claim(claim, source, 0, count, count == 0 and of > 0)
+def none_of(claim: str, source: str, count: int, without: tuple[str, int] | None = None, *, of: int = 1) -> Claim:
+    """A claim that nothing was counted among something; see `at_most`."""
+    beside = None if without is None else Counterfactual(*without, met=without[1] == 0)
+    return Claim(claim, source, 0, count, count == 0 < of, counterfactual=beside)
 
 
-def _beside(claim: str, source: str, expected: str, measured: float | Estimate, *, holds: bool) -> Claim:
+def all_of(claim: str, source: str, count: int, of: int, without: tuple[str, int] | None = None) -> Claim:
+    """A claim that all of some things were counted; see `at_most`."""
+    beside = None if without is None else Counterfactual(*without, met=without[1] == of)
+    return Claim(claim, source, of, count, count == of > 0, counterfactual=beside)
+
+
+def _bounded(
+    claim: str, source: str, expected: str, measured: Measured, without: Without, keeps: Callable[[float], bool]
+) -> Claim:
+    """A claim that both ends of a figure's interval keep a bar; without what is claimed neither may."""
+    value, ends, interval = _told(measured)
+    beside = None
+    if without is not None:
+        what, found = without
+        other, others, between = _told(found)
+        beside = Counterfactual(what, other, any(map(keeps, others)), between)
+    return Claim(claim, source, expected, value, all(map(keeps, ends)), interval, beside)
+
+
+def _told(measured: Measured) -> tuple[float, tuple[float, ...], tuple[float, float] | None]:
+    """A figure, what bars are laid to, and its interval."""
     if isinstance(measured, Estimate):
-        return Claim(claim, source, expected, measured.value, holds, measured.interval)
-    return Claim(claim, source, expected, measured, holds)
+        return measured.value, measured.interval, measured.interval
+    return measured, (measured,), None
 
 
 def _number(bar: float) -> str:
@@ -209,4 +281,5 @@ class Reproduction:
     @property
     def failed(self) -> tuple[Claim, ...]:
         """The claims that don't hold, those about speed included."""
-        return tuple(claim for claim in (*self.findings.claims, *self.findings.timings) if not claim.holds)
+        every = (*self.findings.claims, *self.findings.timings)
+        return tuple(claim for claim in every if claim.verdict is Verdict.FAILS)

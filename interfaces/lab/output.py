@@ -10,7 +10,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from interfaces.lab.claims import Cell, Claim, Figure, Reproduction, Table, interval_said, said
+from interfaces.lab.claims import (
+    Cell,
+    Claim,
+    Counterfactual,
+    Figure,
+    Reproduction,
+    Table,
+    Verdict,
+    interval_said,
+    said,
+)
 from interfaces.runs.drive_run import DIGITS, cell
 from vrs.errors import FormatError
 
@@ -82,7 +92,17 @@ def legend(ax: Axes, *, columns: int = 1, place: Any = "best") -> None:
     ax.legend(loc=place, ncols=columns, fontsize=8.0, handlelength=1.6, labelcolor=INK, borderaxespad=0.3)
 
 
-SCHEMA = "vrs-reproduction/1"
+TONES: Final = {Verdict.HOLDS: "green", Verdict.FAILS: "bold red", Verdict.NOT_SHOWN: "yellow"}
+"""Colours of verdicts on a console."""
+
+
+def measured_said(found: Claim | Counterfactual) -> str:
+    """What was measured, with its interval, as it's shown."""
+    ends = interval_said(found.interval)
+    return f"{said(found.measured)} ({ends})" if ends else said(found.measured)
+
+
+SCHEMA = "vrs-reproduction/2"
 
 
 def to_json(reproduction: Reproduction) -> str:
@@ -113,14 +133,28 @@ def to_json(reproduction: Reproduction) -> str:
 
 
 def _claim(claim: Claim) -> dict[str, Any]:
+    beside = claim.counterfactual
     return {
         "claim": claim.claim,
         "source": claim.source,
         "expected": _value(claim.expected),
         "measured": _value(claim.measured),
-        "interval": None if claim.interval is None else [_value(end) for end in claim.interval],
-        "holds": bool(claim.holds),
-    }
+        "interval": _interval(claim.interval),
+        "counterfactual": None if beside is None else {
+            "what": beside.what,
+            "measured": _value(beside.measured),
+            "interval": _interval(beside.interval),
+            "met": bool(beside.met),
+        },
+        "met": bool(claim.met),
+        "verdict": claim.verdict,
+        "holds": claim.holds,
+        "ours": claim.is_ours,
+    }  # fmt: skip
+
+
+def _interval(interval: Sequence[float] | None) -> list[Cell] | None:
+    return None if interval is None else [_value(end) for end in interval]
 
 
 def _value(given: Cell) -> Cell:
@@ -190,15 +224,18 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
     for title, claims in (("claims", found.claims), ("speed of this machine", found.timings)):
         if not claims:
             continue
+        is_speed = claims is found.timings
         table = RichTable(title=f"{reproduction.paper.name}: {title}", title_justify="left", show_lines=True)
-        shares = {"claim": 4, "source": 2, "expected": 2, "measured": 2, "interval": 2, "holds": 1}
+        shares = {"claim": 4, "source": 2, "expected": 2, "measured": 3, "without it": 4, "verdict": 2}
         for name, share in shares.items():
             table.add_column(name, ratio=share, overflow="fold")
         for claim in claims:
-            ends = interval_said(claim.interval)
-            holds = "yes" if claim.holds else "[bold red]NO[/]"
-            words = claim.claim, claim.source, said(claim.expected), said(claim.measured), ends
-            table.add_row(*(word.replace("[", r"\[") for word in words), holds)
+            beside, verdict = claim.counterfactual, claim.verdict
+            if is_speed and claim.met:
+                verdict = Verdict.HOLDS
+            without = "" if beside is None else f"{beside.what}: {measured_said(beside)}"
+            words = claim.claim, claim.source, said(claim.expected), measured_said(claim), without
+            table.add_row(*(word.replace("[", r"\[") for word in words), f"[{TONES[verdict]}]{verdict}[/]")
         made.append(table)
     for plain in found.tables:
         table = RichTable(title=plain.title.replace("[", r"\["), title_justify="left")

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from interfaces.lab.claims import Verdict
 from interfaces.lab.output import SCHEMA
 from interfaces.report.pages import page
 from interfaces.system import read_within, written
 from vrs.errors import FormatError
 
 Json = Mapping[str, Any]
-COLUMNS: Final = ("claim", "source", "expected", "measured", "interval", "holds")
+COLUMNS: Final = (
+    "claim", "source", "expected", "measured", "interval", "counterfactual", "met", "verdict", "holds", "ours",
+)  # fmt: skip
 """What each claim says of itself."""
 LARGEST: Final = 64 * 2**20
 """Longest file that is read [byte]."""
@@ -31,21 +34,31 @@ class ClaimReport:
     claims: tuple[Json, ...]
     """Each with the keys of `COLUMNS`."""
     timings: tuple[Json, ...] = ()
-    """Claims on the speed of the machine."""
+    """Bars of the machine's speed: met or not."""
     tables: tuple[Json, ...] = ()
     """`title`, `columns` and `rows`."""
     figures: tuple[tuple[str, str], ...] = ()
     """Titles and SVG texts."""
 
     @property
-    def total(self) -> int:
-        """How many claims there are."""
-        return len(self.claims) + len(self.timings)
+    def counts(self) -> dict[str, dict[str, int]]:
+        """How many claims have which verdict, of the paper's own and of ours; a bar of speed is ours."""
+        found = [(row["ours"], row["verdict"]) for row in self.claims]
+        found += [(True, Verdict.HOLDS if bar["met"] else Verdict.FAILS) for bar in self.timings]
+        return {
+            whose: {verdict.value: found.count((ours, verdict)) for verdict in Verdict}
+            for whose, ours in WHOSE.items()
+        }
 
-    @property
-    def held(self) -> int:
-        """How many of them hold."""
-        return sum(bool(claim["holds"]) for claim in (*self.claims, *self.timings))
+
+WHOSE: Final = {"paper": False, "ours": True}
+"""Whether a claim is ours, by who makes it."""
+
+
+def summed(reports: Iterable[ClaimReport]) -> dict[str, dict[str, int]]:
+    """The counts of some reports together."""
+    each = [found.counts for found in reports]
+    return {whose: {verdict: sum(one[whose][verdict] for one in each) for verdict in Verdict} for whose in WHOSE}
 
 
 def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
@@ -62,7 +75,7 @@ def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
     try:
         if document.get("schema") == SCHEMA:
             return (_study(path, document),)
-        return tuple(found for name, part in document["parts"].items() if (found := _benchmark(name, part)).claims)
+        return tuple(found for name, part in document["parts"].items() if (found := _benchmark(name, part)).timings)
     except (KeyError, TypeError, AttributeError) as error:
         raise FormatError(str(path), f"isn't a reproduction or a benchmark's results: {error!r}") from None
 
@@ -95,7 +108,8 @@ def _claim(claim: Json) -> Json:
 
 def _benchmark(name: str, part: Json) -> ClaimReport:
     asked = [_measured(name, result) for result in part["results"] if result["holds"] is not None]
-    return ClaimReport(name, part["title"], (("pace of the machine", f"{part['pace_us']:.0f} µs"),), tuple(asked))
+    facts = (("pace of the machine", f"{part['pace_us']:.0f} µs"),)
+    return ClaimReport(name, part["title"], facts, (), tuple(asked))
 
 
 def _measured(name: str, result: Json) -> Json:
@@ -113,13 +127,17 @@ def _measured(name: str, result: Json) -> Json:
         "expected": result["asked"],
         "measured": ", ".join(words),
         "interval": None,
+        "counterfactual": None,
+        "met": bool(result["holds"]),
+        "verdict": Verdict.HOLDS if result["holds"] else Verdict.FAILS,
         "holds": bool(result["holds"]),
+        "ours": True,
     }
 
 
 PAGE: Final = "reproduce.html"
 DATA: Final = "reproduce.json"
-CLAIMS_SCHEMA: Final = "vrs-claims/1"
+CLAIMS_SCHEMA: Final = "vrs-claims/2"
 
 
 def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> Path:
@@ -146,8 +164,7 @@ def to_json(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -
     """Every claim as JSON; equal findings give equal texts."""
     document = {
         "schema": CLAIMS_SCHEMA,
-        "claims": sum(found.total for found in (*papers, *beyond)),
-        "hold": sum(found.held for found in (*papers, *beyond)),
+        "counts": summed((*papers, *beyond)),
         "papers": [_plain(found) for found in papers],
         "beyond": [_plain(found) for found in beyond],
     }
@@ -159,6 +176,7 @@ def _plain(found: ClaimReport) -> dict[str, Any]:
         "name": found.name,
         "title": found.title,
         **dict(found.facts),
+        "counts": found.counts,
         "claims": list(found.claims),
         "timings": list(found.timings),
     }
@@ -166,7 +184,11 @@ def _plain(found: ClaimReport) -> dict[str, Any]:
 
 def render(papers: Sequence[ClaimReport], beyond: Sequence[ClaimReport] = ()) -> str:
     """The page as one HTML text; equal findings give equal texts."""
-    everything = (*papers, *beyond)
-    total, held = sum(found.total for found in everything), sum(found.held for found in everything)
-    counts = (("claims", total), ("hold", held), ("don't", total - held), ("papers", len(papers)))
-    return page("claims.html", title=f"{held} of {total} claims hold", facts=counts, papers=papers, beyond=beyond)
+    own = summed(papers)["paper"]
+    ours = summed((*papers, *beyond))["ours"]
+    title = f"{own[Verdict.HOLDS]} of {sum(own.values())} claims of the papers hold"
+    facts = tuple(
+        (whose, ", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+        for whose, counts in (("the papers' own", own), ("ours", ours))
+    )
+    return page("claims.html", title=title, facts=facts, papers=papers, beyond=beyond)

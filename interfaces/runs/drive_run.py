@@ -64,10 +64,10 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        if self.robot == BARE:
-            return load(USUAL_BASE), BARE
         name, at, body = self.robot.rpartition("@")
-        if not at or not body.isidentifier():
+        if self.robot == BARE:
+            name, body = USUAL_BASE, BARE
+        elif not at or not body.isidentifier():
             name, body = self.robot, ""
         robot = load(name) if self.known is None else self.known
         return robot, body and robot.body_name(body)

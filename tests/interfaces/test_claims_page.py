@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -11,15 +12,18 @@ import pytest
 
 from interfaces.cli.main import exit_status
 from interfaces.lab import Claim, Findings, Paper, Reproduction, Study, Table
-from interfaces.lab.claims import Figure
+from interfaces.lab.claims import OWN_BAR, Counterfactual, Figure, Verdict
 from interfaces.lab.output import write
 from interfaces.report.claims import COLUMNS, DATA, read_verdicts, render, write_claims
 from vrs.errors import FormatError
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks" / "results.json"
+OFF = Counterfactual("<i>switched</i> off", 4.0, False, (3.0, 5.0))
 CLAIMS = (
-    Claim("it <b>holds</b> [cm]", "eq. (1)", 2.0, 1.9999, True, (1.5, 2.5)),
-    Claim("it doesn't", "eq. (2)", "at most 1", 3.0, False),
+    Claim("it <b>holds</b> [cm]", "eq. (1)", 2.0, 1.9999, True, (1.5, 2.5), OFF),
+    Claim("it doesn't", "eq. (2)", "at most 1", 3.0, False, counterfactual=OFF),
+    Claim("it would anyway", OWN_BAR, "at most 5", 3.0, True, counterfactual=replace(OFF, met=True)),
+    Claim("beside nothing", OWN_BAR, "at most 5", 3.0, True),
 )
 
 
@@ -57,24 +61,29 @@ def read(page: str) -> Reader:
 
 def test_every_claim_comes_through_with_all_that_it_says(paper, tmp_path):
     (found,) = read_verdicts(paper)
-    assert (found.total, found.held) == (3, 2)
+    assert found.counts == {
+        "paper": {"holds": 1, "doesn't hold": 1, "not shown by this": 0},
+        "ours": {"holds": 1, "doesn't hold": 0, "not shown by this": 2},
+    }
     page = write_claims(tmp_path, [found], read_verdicts(BENCHMARKS))
     document = json.loads((tmp_path / DATA).read_text())
     assert document["papers"][0]["claims"][0] == {
         "claim": CLAIMS[0].claim, "source": "eq. (1)", "expected": 2.0, "measured": 1.9999, "interval": [1.5, 2.5],
-        "holds": True,
+        "counterfactual": {"what": OFF.what, "measured": 4.0, "interval": [3.0, 5.0], "met": False},
+        "met": True, "verdict": "holds", "holds": True, "ours": False,
     }  # fmt: skip
     rows = [attributes.get("class") for tag, attributes in read(page.read_text()).seen if tag == "tr"]
-    assert rows.count("holds") == document["hold"]
-    assert rows.count("holds") + rows.count("fails") == document["claims"]
+    for verdict in Verdict:
+        assert rows.count(verdict[0]) == sum(counts[verdict] for counts in document["counts"].values())
 
 
 def test_the_page_is_safe_whole_and_asks_nobody_for_anything(paper):
     page = render(read_verdicts(paper))
     assert "<b>holds</b>" not in page
+    assert "<i>switched</i>" not in page
     assert not re.search(r"<script|src=\"(?!data:)|https?://", page)
     assert page.count("data:image/svg+xml") == 1
-    assert "<title>2 of 3 claims hold</title>" in page
+    assert "<title>1 of 2 claims of the papers hold</title>" in page
 
 
 def test_equal_findings_are_equal_pages(paper):
@@ -84,12 +93,12 @@ def test_equal_findings_are_equal_pages(paper):
 def test_what_benchmarks_were_asked_for_is_there_once_each():
     data = json.loads(BENCHMARKS.read_text())
     asked = [row for part in data["parts"].values() for row in part["results"] if row["holds"] is not None]
-    found = [claim for part in read_verdicts(BENCHMARKS) for claim in part.claims]
+    found = [claim for part in read_verdicts(BENCHMARKS) for claim in part.timings]
     assert [claim["holds"] for claim in found] == [row["holds"] for row in asked]
     assert all(set(claim) == set(COLUMNS) and claim["expected"] for claim in found)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"parts": {"a": {}}}', '{"schema": "vrs-reproduction/1"}', "\0"])
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"parts": {"a": {}}}', '{"schema": "vrs-reproduction/2"}', "\0"])
 def test_another_file_is_refused_in_one_line(tmp_path, text, capfd):
     path = tmp_path / "other.json"
     path.write_text(text)

@@ -238,7 +238,7 @@ def _bounded(what: str, bar: float, values: Sequence[float], study: Study) -> Cl
     """A mean with its interval; it holds if all values keep the bar."""
     holds = max(values) <= bar
     if not math.isfinite(max(values)):
-        return Claim(what, OWN_BAR, f"≤ {bar:g} in each run", "a stop wasn't reached", holds=False)
+        return Claim(what, OWN_BAR, f"≤ {bar:g} in each run", "a stop wasn't reached", met=False)
     mean = bootstrap(values, study.seed)
     return Claim(what, OWN_BAR, f"≤ {bar:g} in each run", mean.value, holds, mean.interval)
 

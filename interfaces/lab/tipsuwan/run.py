@@ -149,6 +149,8 @@ class NetworkControl(enum.StrEnum):
     """The tracker behind the middleware, with the exact root."""
     NETWORK = "network"
     """The same with the neural network: the paper's."""
+    UNSCHEDULED = "unscheduled"
+    """The tracker behind a middleware that predicts, but slows nothing down."""
     PREDICTIVE = "mpc"
     """A model-predictive controller in their place."""
 
@@ -231,6 +233,10 @@ def behind(control: NetworkControl, controller: Controller, config: MiddlewareCo
     if control is NetworkControl.DIRECT:
         return GainSchedulingMiddleware(
             controller, MiddlewareConfig(config.epsilon, config.probing, predicts=False, schedules=False)
+        )
+    if control is NetworkControl.UNSCHEDULED:
+        return GainSchedulingMiddleware(
+            controller, MiddlewareConfig(config.epsilon, config.probing, schedules=False)
         )
     return GainSchedulingMiddleware(
         controller, config, network=default_network() if control is NetworkControl.NETWORK else None

@@ -32,7 +32,7 @@ def _without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def failed(claims: Iterable[Claim]) -> list[str]:
-    return [claim.claim for claim in claims if not claim.holds]
+    return [claim.claim for claim in claims if not claim.met]
 
 
 def only(claims: Iterable[Claim], *said: str) -> None:

@@ -124,9 +124,9 @@ def _without_maps(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_claims_on_goals_fail_where_a_trip_did(group: str, changes: dict[str, Any], said: list[str]) -> None:
     good = [found(FURNITURE), found(ROUND), found(LATE)]
-    assert [claim.claim for claim in conclude_asked(Study(), tuple(good)).claims if not claim.holds] == []
+    assert [claim.claim for claim in conclude_asked(Study(), tuple(good)).claims if not claim.met] == []
     made = conclude_asked(Study(), (*good, found(group, **changes))).claims
-    assert [any(word in claim.claim for word in said) for claim in made] == [not claim.holds for claim in made]
+    assert [any(word in claim.claim for word in said) for claim in made] == [not claim.met for claim in made]
 
 
 @pytest.mark.usefixtures("without_maps")
@@ -136,13 +136,13 @@ def test_routes_that_are_mostly_too_long_or_unknown_are_said_so() -> None:
             Study(), tuple(found(group, **changes) for group in (FURNITURE, ROUND, LATE))
         ).claims[2]
         assert "median" in middle.claim
-        assert not middle.holds
+        assert not middle.met
 
 
 @pytest.mark.usefixtures("without_maps")
 def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
     def holds(conclude: Callable[..., Findings], *trips: Trip) -> list[bool]:
-        return [claim.holds for claim in conclude(Study(), trips).claims]
+        return [claim.met for claim in conclude(Study(), trips).claims]
 
     shut = found(SHUT, **FAILED)
     assert holds(conclude_shut, shut) == [True]

@@ -41,7 +41,7 @@ def test_the_scenario_is_played_to_its_end() -> None:
     assert 0.05 < found.passed < 1.5
     assert all(stop.off < 0.05 and stop.turned < math.radians(2) and stop.lost < 0.01 for stop in found.stops)
     claims = conclude(Study(runs=2), ((found,), (found,), (), (), ())).claims
-    assert all(claim.holds for claim in claims)
+    assert all(claim.met for claim in claims)
     home = place("home")
     a, b = home.place("A"), home.place("B")
     near = [min(math.dist(row[:2], (spot.x, spot.y)) for row in found.track.tolist()) for spot in (a, b)]
@@ -114,9 +114,9 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Results) -> dict[str, Clai
 def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
     changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert all(claim.holds for claim in concluded(monkeypatch, *[GOOD] * 6).values())
+    assert all(claim.met for claim in concluded(monkeypatch, *[GOOD] * 6).values())
     found = concluded(monkeypatch, *[GOOD] * 5, Results(**vars(GOOD) | changes))
-    assert [any(word in text for word in said) for text in found] == [not claim.holds for claim in found.values()]
+    assert [any(word in text for word in said) for text in found] == [not claim.met for claim in found.values()]
 
 
 def test_a_gap_is_from_outline_to_outline() -> None:

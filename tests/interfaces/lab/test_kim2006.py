@@ -101,7 +101,7 @@ def test_a_network_is_measured_and_concluded(monkeypatch: pytest.MonkeyPatch) ->
     found = links.work(SMALL, "none")
     assert set(found[0].means) == set(SCHEMES)
     made = links.conclude(SMALL, (found,))
-    assert made.claims[0].holds
+    assert made.claims[0].met
     assert len(made.tables[0].rows) == 4
     assert {figure.name for figure in made.figures} == {"paths", "path_errors"}
 
@@ -131,7 +131,7 @@ def test_a_claim_fails_where_tcp_is_nearer() -> None:
     pairs = dict.fromkeys(("tcp", "fixed", "repeated"), ((0.02, 0.021), (0.01, 0.011)))
     mean = links.mean_of([followed(0.01, 1)])
     worse = Results(delay="mon", loss=0.1, means=dict.fromkeys(SCHEMES, mean), pairs=pairs)
-    assert not links.wins_claim(worse).holds
+    assert not links.wins_claim(worse).met
     rows = links.wins_table([worse]).rows
     assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]
 
@@ -141,9 +141,9 @@ def test_narrow_links_are_concluded_by_the_ages() -> None:
         return [(0.01, 0.02, 1.0, age + 0.001 * k, 0.1, 0.0, 1.0, 1.0) for k in range(3)]
 
     good = tuple((made(0.1), made(4.0 if case == "16" else 0.1)) for case in links.NARROW_CASES)
-    assert all(claim.holds for claim in links.conclude_narrow(SMALL, good).claims)
+    assert all(claim.met for claim in links.conclude_narrow(SMALL, good).claims)
     bad = tuple((made(0.5), made(0.1)) for _ in links.NARROW_CASES)
-    assert not any(claim.holds for claim in links.conclude_narrow(SMALL, bad).claims)
+    assert not any(claim.met for claim in links.conclude_narrow(SMALL, bad).claims)
 
 
 def test_the_paper_is_in_the_list() -> None:

@@ -55,7 +55,7 @@ def room(name: str = "", bad: PostureErrors = GOOD) -> Results:
 
 
 def failed(conclude: Callable[..., Findings], found: Sequence[Any]) -> list[str]:
-    return [claim.claim for claim in conclude(Study(), tuple(found)).claims if not claim.holds]
+    return [claim.claim for claim in conclude(Study(), tuple(found)).claims if not claim.met]
 
 
 ACCURATE = [
