@@ -27,7 +27,7 @@ STUDY = Study(seed=0, runs=2, length=4.0)
 
 @pytest.fixture(autouse=True)
 def _without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (agreement, dragging, encoding, interactivity, jitter, segments):
+    for module in (agreement, delays, dragging, encoding, interactivity, jitter, segments):
         monkeypatch.setattr(module, "draw", lambda *_, **__: Figure("", "", ""))
 
 
@@ -49,36 +49,45 @@ def but(seen: Results, **changes: Any) -> Results:
 
 
 SHARE = 1.0 - math.exp(-0.8 * 0.5)
+LATE = Results(
+    lateness=(0.3, 0.3), postponed=1.0, ages=(0.2, 0.2, 0.2), shown=0.02, falsified=0.0, wrong=0.0, foretold=0.0,
+    foretold_back=0.0,
+)  # fmt: skip
 PREDICTED = Results(
-    lateness=(0.0, 0.0), postponed=0.0, ages=(0.0, 0.0, 0.0), shown=0.02, falsified=SHARE, foretold=SHARE
-)
+    lateness=(0.0, 0.0), postponed=0.0, ages=(0.0, 0.0, 0.0), shown=0.02, falsified=SHARE, wrong=SHARE,
+    foretold=SHARE, foretold_back=0.15,
+)  # fmt: skip
+DELAYED = {
+    "0": LATE,
+    "-Df": but(LATE, lateness=(0.0, 0.0), postponed=0.0, ages=(0.5, 0.5, 0.5)),
+    "-Df, predicted": PREDICTED,
+    "+Db": but(LATE, lateness=(0.5, 0.5), ages=(0.0, 0.0, 0.0)),
+}
+SHARES = np.tile(-np.expm1(-0.8 * np.array(delays.LEADS)), (3, 1))
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("case", "changes", "said"),
     [
-        ({}, []),
-        ({"lateness": (0.0, 1e-8)}, ["come late"]),
-        ({"ages": (0.0, 0.0, 1e-8)}, ["age of frames"]),
-        ({"ages": (-1e-8, 0.0, 0.0)}, ["age of frames"]),
-        ({"postponed": 0.1}, ["postponed"]),
-        ({"falsified": SHARE + 0.011}, ["largest difference"]),
-        ({"falsified": 0.8 * SHARE, "foretold": 0.8 * SHARE}, ["share of predicted"]),
+        ("0", {}, []),
+        ("-Df, predicted", {"lateness": (0.0, 1e-8)}, ["come late"]),
+        ("-Df, predicted", {"ages": (0.0, 0.0, 1e-8)}, ["age of frames"]),
+        ("+Db", {"ages": (-1e-8, 0.0, 0.0)}, ["age of frames"]),
+        ("-Df", {"postponed": 0.1}, ["postponed"]),
+        ("-Df, predicted", {"wrong": SHARE + 0.011}, ["largest difference"]),
+        ("-Df, predicted", {"falsified": 0.5 * SHARE}, ["D_f + D_b: share falsified"]),
+        ("-Df", {"wrong": 0.01}, ["foretell nothing"]),
     ],
 )
-def test_delays_of_predicted_frames(changes: dict[str, Any], said: list[str]) -> None:
-    setting = delays.SETTINGS["-Df, predicted"]
-    only(delays.delay_claims(STUDY, setting, [but(PREDICTED, **changes)] * 2), *said)
+def test_delays(case: str, changes: dict[str, Any], said: list[str]) -> None:
+    runs = {name: [seen] * 2 for name, seen in DELAYED.items()}
+    changed = runs | {case: [but(DELAYED[case], **changes)] * 2}
+    only(delays.conclude(STUDY, (*changed.values(), list(SHARES))).claims, *said)
 
 
-def test_delays_of_frames_that_foretell_nothing_and_of_leads() -> None:
-    setting = delays.SETTINGS["-Df"]
-    seen = but(PREDICTED, ages=(0.5, 0.5, 0.5), falsified=0.0)
-    only(delays.delay_claims(STUDY, setting, [seen] * 2))
-    only(delays.delay_claims(STUDY, setting, [seen, but(seen, falsified=0.01)]), "none being predicted")
-    shares = np.tile(-np.expm1(-0.8 * np.array(delays.LEADS)), (3, 1))
-    only(delays.lead_claims(STUDY, shares))
-    only(delays.lead_claims(STUDY, 0.85 * shares), "0.1 s", "0.5 s", "1 s")
+def test_shares_of_leads() -> None:
+    found = delays.conclude(STUDY, (*([seen] * 2 for seen in DELAYED.values()), list(0.85 * SHARES)))
+    only(found.claims, "0.1 s", "0.5 s", "1 s")
 
 
 NOWHERE = np.zeros((1, 3))
@@ -221,18 +230,26 @@ def test_agreement(case: str, changes: dict[str, Any], said: list[str]) -> None:
     only(agreement.conclude(STUDY, tuple([good[name], bad[name]] for name in good)).claims, *said)
 
 
-SPLICED = Results(position_jump=0.0, velocity_jump=0.0, tails=5, changed=0, uneven=0.0, past=0.0)
+def tail(**figures: Any) -> segments.Tail:
+    found = segments.Tail()
+    vars(found).update({"segments": 5, "changed": 0, "uneven": 0.0} | figures)
+    return found
+
+
+SPLICED = Results(
+    jumps=(0.0, 0.0), naive=(1.0, 1.0), tail=tail(), anew=tail(changed=5, uneven=1.0), past=0.0, early=0.1
+)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"position_jump": 2e-9}, ["largest jump [rad]"]),
-        ({"velocity_jump": 2e-9}, ["largest jump [rad/s]"]),
-        ({"changed": 1}, ["segments that changed"]),
-        ({"uneven": 2e-9}, ["difference of shifts"]),
+        ({"jumps": (2e-9, 0.0)}, ["largest jump [rad]"]),
+        ({"jumps": (0.0, 2e-9)}, ["largest jump [rad/s]"]),
+        ({"tail": tail(changed=1)}, ["segments that changed"]),
+        ({"tail": tail(uneven=2e-9)}, ["difference of shifts"]),
         ({"past": 2e-9}, ["largest change before"]),
-        ({"tails": 0}, ["segments that changed", "difference of shifts"]),
+        ({"tail": tail(segments=0)}, ["segments that changed", "difference of shifts"]),
     ],
 )
 def test_segments(changes: dict[str, Any], said: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,12 +259,12 @@ def test_segments(changes: dict[str, Any], said: list[str], monkeypatch: pytest.
 
 
 def test_causality(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(causality, "over_a_link", lambda D, _, __: (3, 9 if D else 10, 10))
-    monkeypatch.setattr(causality, "both_sites", lambda D, _, __: (0, 1, 10))
+    def told(D: float, *_: object) -> tuple[dict[float, int], int]:
+        return {other: 5 for other in causality.OFFSETS.values()} | {D: 9 if D else 10}, 10
+
+    monkeypatch.setattr(causality, "over_a_link", told)
+    monkeypatch.setattr(causality, "both_sites", lambda *_: (0, 1, 10))
     only(causality.work(STUDY, "").claims, "D = −D_f: commands", "D = +D_b: commands", "D = −D_f: postponed")
-    monkeypatch.setattr(causality, "over_a_link", lambda *_: (3, 10, 10))
-    monkeypatch.setattr(causality, "both_sites", lambda *_: (0, 0, 10))
-    only(causality.work(STUDY, "").claims, "D = 0: postponed")
 
 
 SCRUBBED = Results(
