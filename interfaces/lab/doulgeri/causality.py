@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from interfaces import Designer
-from interfaces.lab.claims import Claim, Findings, Study
+from interfaces.lab.claims import Claim, Counterfactual, Findings, Study, all_of
+from interfaces.lab.doulgeri.rivals import postponing
 from interfaces.lab.doulgeri.script import D_B, D_F, HOME, MODEL, ScriptedSite, script, target, twins
 from interfaces.link import Conditions, ConstantDelay
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
@@ -16,22 +17,24 @@ from vrs.ledger import Receipt
 
 II_C: Final = "Section II-C"
 IV: Final = "Section IV"
+OFFSETS: Final = {"0": 0.0, "−D_f": -D_F, "+D_b": D_B}
+"""Offsets of the engine's clock [s]."""
+OFFLINE: Final = "no real-time clock"
 
 
-def refused_before_issue() -> tuple[int, int]:
+def refused_before_issue(*, real_time: bool = True) -> tuple[int, int]:
     """Commands with t_exec < t_iss that were rejected, and how many there were."""
-    clock = ManualClock(5.0)
-    engine = Engine(MODEL, q=HOME, clock=clock)
+    engine = Engine(MODEL, q=HOME, clock=ManualClock(5.0) if real_time else None)
     asked = [5.0 - early for early in (1e-6, 0.1, 1.0, 4.9)]
     answers = [engine.execute(MotionCommand(JointTarget(HOME + 0.1), 5.0, t)) for t in asked]
     return sum(answer.status is Status.REJECTED for answer in answers), len(answers)
 
 
-def late(lateness: Lateness) -> tuple[Receipt, float, float]:
+def late(lateness: Lateness, *, real_time: bool = True) -> tuple[Receipt, float, float]:
     """A command for a time that has passed: receipt, end of the segment then active, change of the past."""
     clock = ManualClock(0.0)
-    engine = Engine(MODEL, q=HOME, clock=clock, lateness=lateness)
-    engine.execute(MotionCommand(JointTarget(HOME + 0.8), speed=0.4))
+    engine = Engine(MODEL, q=HOME, clock=clock if real_time else None, lateness=lateness)
+    engine.execute(MotionCommand(JointTarget(HOME + 0.8), execute_at=0.0, speed=0.4))
     clock.set(0.8)
     before = engine.timeline
     t = np.linspace(0.0, 0.8, 500)
@@ -41,8 +44,8 @@ def late(lateness: Lateness) -> tuple[Receipt, float, float]:
     return receipt, active.end, change
 
 
-def over_a_link(D: float, seed: int, length: float) -> tuple[int, int, int]:
-    """Commands in time by the transformed inequality, those it tells rightly, and how many there were."""
+def over_a_link(D: float, seed: int, length: float) -> tuple[dict[float, int], int]:
+    """Commands of which each offset's inequality tells rightly whether they're in time, and how many there were."""
     rng = np.random.default_rng(seed)
     joined = ScriptedSite(D)
     designer = Designer(joined.connect(D_F, D_B))
@@ -57,18 +60,17 @@ def over_a_link(D: float, seed: int, length: float) -> tuple[int, int, int]:
         t += 0.4
     joined.run(length + 5.0)
     statuses = [None if issued.receipt is None else issued.receipt.status for issued in designer.history]
-    in_time = [wait >= D_F + D - 1e-9 for wait in ahead]
-    right = sum(
-        status is (Status.ACCEPTED if ok else Status.POSTPONED)
-        for status, ok in zip(statuses, in_time, strict=True)
-    )
-    return sum(in_time), right, len(ahead)
+    right = {}
+    for other in OFFSETS.values():
+        told = [Status.ACCEPTED if wait >= D_F + other - 1e-9 else Status.POSTPONED for wait in ahead]
+        right[other] = sum(status is says for status, says in zip(statuses, told, strict=True))
+    return right, len(ahead)
 
 
 def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands postponed at the operator's site and at the robot's, and how many both accepted or postponed."""
     rng = np.random.default_rng(seed)
-    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, D)
+    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, postponing(D))
     operator = lab.operator
     mine: dict[int, float] = {}
 
@@ -90,42 +92,58 @@ def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
 
 
 def work(study: Study, _case: str) -> Findings:
-    """Measure each restriction."""
+    """Measure each restriction, and what is so without it."""
     rejected, asked = refused_before_issue()
     postponed, end, past = late(Lateness.POSTPONE)
     aborted, _, untouched = late(Lateness.REJECT)
-    at = postponed.execute_at
+    silent, other_end, rewritten = late(Lateness.POSTPONE, real_time=False)
+    begins, other_begins = (
+        np.inf if receipt.execute_at is None else receipt.execute_at - over
+        for receipt, over in ((postponed, end), (silent, other_end))
+    )
     claims = [
-        Claim(
-            "t_exec < t_iss: commands rejected",
-            f"{II_C}, 1)", f"{asked} of {asked}", f"{rejected} of {asked}", rejected == asked,
-        ),
+        all_of("t_exec < t_iss: commands rejected", f"{II_C}, 1)", rejected, asked,
+               (OFFLINE, refused_before_issue(real_time=False)[0])),
         Claim(
             "a command for the past, policy postpone: begins after the end of the active segment by [s]",
-            f"{II_C}, 2)", 0.0, "never" if at is None else at - end,
-            postponed.status is Status.POSTPONED and at is not None and abs(at - end) <= 1e-9,
+            f"{II_C}, 2)", 0.0, begins, abs(begins) <= 1e-9,
+            counterfactual=Counterfactual(OFFLINE, other_begins, abs(other_begins) <= 1e-9),
         ),
         Claim(
             "the same, policy reject",
             f"{II_C}, 2)", "rejected", str(aborted.status), aborted.status is Status.REJECTED,
+            counterfactual=Counterfactual(OFFLINE, str(silent.status), silent.status is Status.REJECTED),
         ),
         Claim(
             "the past stays as it was: largest change [rad]",
             f"{II_C}, 2)", 0.0, max(past, untouched), max(past, untouched) == 0.0,
+            counterfactual=Counterfactual(OFFLINE, rewritten, rewritten == 0.0),
         ),
     ]  # fmt: skip
-    for k, (D, name) in enumerate(((0.0, "0"), (-D_F, "−D_f"), (D_B, "+D_b"))):
+    for k, (name, D) in enumerate(OFFSETS.items()):
         counted = [over_a_link(D, study.seed + 1000 * k + run, study.length) for run in range(study.runs)]
-        total, right = sum(c[2] for c in counted), sum(c[1] for c in counted)
+        total = sum(c[1] for c in counted)
+        other, its = ("D = 0", 0.0) if D else ("D = −D_f", -D_F)
         text = f"D = {name}: commands are in time exactly if t_exec ≥ t_iss + D_f + D; told rightly, of {total}"
-        holds = right == total and sum(c[0] for c in counted) > 0
-        claims.append(Claim(text, f"{IV}, IV-A", total, right, holds))
-    for D, name in ((-D_F, "−D_f"), (0.0, "0")):
-        seen = [both_sites(D, study.seed + 5000 + run, study.length) for run in range(study.runs)]
-        here, there, total = (sum(s[i] for s in seen) for i in range(3))
-        wanted = "none at either end" if D else "none at the operator's end, some at the robot's"
-        text = f"the same commands at the operator's virtual robot and at the real one, D = {name}: postponed"
-        found = f"{here} there, {there} at the robot, of {total}"
-        holds = here == 0 and (there == 0 if D else there > 0) and total > 0
-        claims.append(Claim(text, f"{IV}, V", wanted, found, holds))
+        right, wrong = (sum(c[0][which] for c in counted) for which in (D, its))
+        beside = f"told by the inequality of {other}"
+        claims.append(all_of(text, f"{IV}, IV-A", right, total, (beside, wrong)))
+    ours, unshifted = (
+        [both_sites(D, study.seed + 5000 + run, study.length) for run in range(study.runs)] for D in (-D_F, 0.0)
+    )
+    total = sum(s[2] for s in ours)
+    text = f"the same commands at the operator's virtual robot and at the real one, D = −D_f: postponed, of {total}"
+    (found, met), (other_found, other_met) = _postponed(ours), _postponed(unshifted)
+    claims.append(
+        Claim(
+            text, f"{IV}, V", "none at either end", found, met and total > 0,
+            counterfactual=Counterfactual("D = 0", other_found, other_met),
+        )
+    )  # fmt: skip
     return Findings(tuple(claims))
+
+
+def _postponed(seen: list[tuple[int, int, int]]) -> tuple[str, bool]:
+    """How many commands were postponed at each end, and whether none was."""
+    here, there = (sum(s[i] for s in seen) for i in range(2))
+    return f"{here} there, {there} at the robot", here == there == 0

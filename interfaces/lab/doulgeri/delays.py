@@ -7,13 +7,24 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from interfaces import Designer, Viewer
-from interfaces.lab.claims import Cell, Claim, Findings, Results, Study, Table, at_most
+from interfaces.lab.claims import (
+    OWN_BAR,
+    Cell,
+    Claim,
+    Counterfactual,
+    Findings,
+    Results,
+    Study,
+    Table,
+    at_most,
+)
 from interfaces.lab.doulgeri.script import D_B, D_F, PortLog, ScriptedSite, arrivals, target
 from interfaces.lab.output import BAD, MUTED, REAL, VIRTUAL, draw, legend
 from interfaces.lab.statistics import Estimate, bootstrap, interval_name
 from interfaces.messages import Frame, FrameStatus, ViewForm
 from vrs import MotionCommand
 from vrs.checks import one_of
+from vrs.model import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +66,16 @@ SETTINGS: Final = {
     "+Db": OffsetSetting("D = +D_b", D_B, 0.0, "Fig. 6"),
 }
 CASES: Final = (*SETTINGS, "leads")
+WITHOUT: Final = {
+    "0": ("-Df", "-Df"),
+    "-Df": ("0", "0"),
+    "-Df, predicted": ("0", "-Df"),
+    "+Db": ("0", "0"),
+}
+"""What stands beside a setting: for the lateness of commands, for the age of frames."""
+PREDICTED: Final = "-Df, predicted"
+WRONG: Final = 1e-9
+"""A frame that's further from where the robot then was [rad] is wrong."""
 
 
 def run(setting: OffsetSetting, seed: int, length: float) -> Results:
@@ -81,6 +102,8 @@ def run(setting: OffsetSetting, seed: int, length: float) -> Results:
     # While commands come: before and after there's nothing that could falsify.
     busy = [f for f, _ in log.frames if 1.0 + setting.lead <= f.t - setting.D <= 1.0 + length]
     verdicts = [broadcaster.status(frame.number) for frame in busy]
+    was = joined.engine.timeline.sample(np.array([frame.t for frame in busy]))
+    off = np.abs(np.array([frame.q for frame in busy]).reshape(was.shape) - was).max(axis=1)
     made = [log.outcomes[i.number].made_at for i in designer.history]  # engine's time when each command came [s]
     return Results(
         # How late each command was when it came to the engine [s].
@@ -90,7 +113,9 @@ def run(setting: OffsetSetting, seed: int, length: float) -> Results:
         ages=(float(ages.min()), float(ages.mean()), float(ages.max())),
         shown=max(shown.age for shown in viewer.history),  # largest age of a frame when it was shown [s]
         falsified=float(np.mean([v is not None and v.status is FrameStatus.FALSIFIED for v in verdicts])),  # share
+        wrong=float(np.mean(off > WRONG)),  # share of frames that show another place than where the robot then was
         foretold=foretold(busy, began),  # share of the frames in whose lead a command was carried out
+        foretold_back=foretold(busy, began, D_B),  # the same if only the way back counted
         # For the timing diagrams: the users' time when a command was issued, the engine's when it came [s].
         commands=tuple(zip(issued.tolist(), made, strict=True)),
         # And the engine's time when a frame was made, the time it shows, and the users' when it came [s].
@@ -98,12 +123,19 @@ def run(setting: OffsetSetting, seed: int, length: float) -> Results:
     )
 
 
-def foretold(frames: list[Frame], began: np.ndarray) -> float:
-    """Share of frames with a motion that began after they were made and before the time that they show."""
+def foretold(frames: list[Frame], began: Array, lead: float | None = None) -> float:
+    """Share of frames with a motion that began after they were made and before the time that they show.
+
+    Args:
+        frames: What was sent.
+        began: When motions began [s], ascending.
+        lead: How long after it was made a frame counts [s]; up to the time that it shows unless given.
+    """
     if not len(frames):
         return 0.0
     made, shows = np.array([(frame.made_at, frame.t) for frame in frames]).T
-    hits = np.searchsorted(began, shows - 1e-4) > np.searchsorted(began, made)
+    until = shows if lead is None else made + lead
+    hits = np.searchsorted(began, until - 1e-4) > np.searchsorted(began, made)
     return float(hits.mean())
 
 
@@ -131,63 +163,78 @@ def work(study: Study, case: str) -> list[Any]:
 
 def conclude(study: Study, found: tuple[list[Any], ...]) -> Findings:
     """Compare with what the paper's formulas say."""
-    claims: list[Claim] = []
-    rows = []
-    for setting, seen in zip(SETTINGS.values(), found, strict=False):
-        claims += delay_claims(study, setting, seen)
-        rows.append(_row(study, setting, seen))
-    shares = np.array(found[-1])
-    claims += lead_claims(study, shares)
+    runs, shares = dict(zip(SETTINGS, found, strict=False)), np.array(found[-1])
+    claims = [claim for case in SETTINGS for claim in delay_claims(case, runs)]
+    claims += [*frame_claims(runs), *lead_claims(study, runs, shares)]
+    rows = [_row(study, SETTINGS[case], seen) for case, seen in runs.items()]
     title = f"Figs 4 to 6: D_f = {D_F} s, D_b = {D_B} s, {COMMANDS:g} commands a second"
     timing = "Figs 4 to 6, from a run: a command and a frame under each clock offset"
     pictures = (
-        draw("figs4-6-timing", timing, _paint, [runs[0] for runs in found[:-1]], height=7.0),
+        draw("figs4-6-timing", timing, _paint, [seen[0] for seen in found[:-1]], height=7.0),
         draw("falsified", "Share of predicted frames that a command falsified", _paint_leads, study, shares),
     )
     return Findings(tuple(claims), (Table.of("delays", title, rows),), pictures)
 
 
-def delay_claims(study: Study, setting: OffsetSetting, seen: list[Results]) -> list[Claim]:
-    """What must hold of the runs at one setting of the offset."""
-    late = np.concatenate([s.lateness for s in seen])
-    off = float(np.abs(late - setting.lateness).max())
-    low, high = min(s.ages[0] for s in seen), max(s.ages[2] for s in seen)
-    age = float(np.mean([s.ages[1] for s in seen]))
-    aged = abs(low - setting.age) <= NANOSECONDS and abs(high - setting.age) <= NANOSECONDS
+def delay_claims(case: str, runs: dict[str, list[Results]]) -> list[Claim]:
+    """What must hold of the runs at one setting of the offset, beside what is so at another."""
+    setting, seen = SETTINGS[case], runs[case]
+    other_late, other_aged = WITHOUT[case]
     claims = [
-        Claim(
+        _exactly(
             f"{setting.title}: commands to be carried out at once come late by [s]",
-            setting.source, setting.lateness, float(late.mean()), off <= NANOSECONDS,
+            setting.source, setting.lateness, _lateness(seen),
+            SETTINGS[other_late].title, _lateness(runs[other_late]),
         ),
-        Claim(
+        _exactly(
             f"{setting.title}: age of frames by the user's clock when they come [s]",
-            setting.source, setting.age, age, aged,
+            setting.source, setting.age, _ages(seen), SETTINGS[other_aged].title, _ages(runs[other_aged]),
         ),
     ]  # fmt: skip
     if setting.lateness == 0:
-        most = max(s.postponed for s in seen)
-        claims.append(Claim(f"{setting.title}: share of commands postponed", setting.source, 0.0, most, most == 0))
-    share = bootstrap([s.falsified for s in seen], study.seed)
-    if setting.lead:
-        gap = max(abs(s.falsified - s.foretold) for s in seen)
-        text = (
-            "predicted frames are false exactly where a command is executed between t_c and t_c + D_f + D_b: "
-            "largest difference of both shares in a run"
-        )
-        claims.append(at_most(text, setting.source, 0.01, gap))
-        text = f"share of predicted frames falsified, {COMMANDS:g} commands/s: 1 − exp(−rate · lead)"
-        claims.append(_share_claim(text, setting.source, setting.lead, share))
-    else:
-        text = f"{setting.title}: share of frames falsified, none being predicted"
-        claims.append(Claim(text, setting.source, 0.0, share.value, share.value == 0))
+        most, other = (max(s.postponed for s in x) for x in (seen, runs[other_late]))
+        claims.append(
+            at_most(
+                f"{setting.title}: share of commands postponed", setting.source, 0, most,
+                (SETTINGS[other_late].title, other),
+            )
+        )  # fmt: skip
     return claims
 
 
-def _share_claim(text: str, source: str, lead: float, share: Estimate) -> Claim:
-    """It holds if the interval holds what's expected, or both are within 10 %: then they're called equal."""
-    expected = -float(np.expm1(-COMMANDS * lead))
-    equal = share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
-    return Claim(text, source, expected, share.value, equal, share.interval)
+def _exactly(text: str, source: str, expected: float, found: Array, beside: str, other: Array) -> Claim:
+    """A claim that every value is as expected, to what the engine's clock reads."""
+    met, other_met = (bool(np.abs(x - expected).max() <= NANOSECONDS) for x in (found, other))
+    counterfactual = Counterfactual(beside, float(other.mean()), other_met)
+    return Claim(text, source, expected, float(found.mean()), met, counterfactual=counterfactual)
+
+
+def _lateness(seen: list[Results]) -> Array:
+    return np.concatenate([s.lateness for s in seen])
+
+
+def _ages(seen: list[Results]) -> Array:
+    return np.array([s.ages for s in seen])
+
+
+def frame_claims(runs: dict[str, list[Results]]) -> list[Claim]:
+    """Which frames show another place than the one where the robot then was."""
+    predicted = runs[PREDICTED]
+    plain = max(s.wrong for case, seen in runs.items() if not SETTINGS[case].lead for s in seen)
+    gap, back = (
+        max(abs(s.wrong - getattr(s, which)) for s in predicted) for which in ("foretold", "foretold_back")
+    )
+    text = (
+        "predicted frames are false exactly where a command is executed between t_c and t_c + D_f + D_b: "
+        "largest difference of both shares in a run"
+    )
+    return [
+        at_most(
+            "frames that foretell nothing show where the robot then was, under each offset: share that's false",
+            "Section IV-A", 0, plain, (SETTINGS[PREDICTED].title, max(s.wrong for s in predicted)),
+        ),
+        at_most(text, "Section IV-A", 0.01, gap, ("between t_c and t_c + D_b", back)),
+    ]  # fmt: skip
 
 
 def _row(study: Study, setting: OffsetSetting, seen: list[Results]) -> tuple[tuple[str, Cell], ...]:
@@ -207,16 +254,34 @@ def _row(study: Study, setting: OffsetSetting, seen: list[Results]) -> tuple[tup
     )
 
 
-def lead_claims(study: Study, shares: np.ndarray) -> list[Claim]:
+def lead_claims(study: Study, runs: dict[str, list[Results]], shares: Array) -> list[Claim]:
     """What must hold of the shares of predicted frames that were falsified; shares: (runs, leads)."""
-    text = "frames {:g} s ahead, {:g} commands/s: share falsified, 1 − exp(−rate · lead)"
+    measured = {lead: bootstrap(shares[:, k], study.seed) for k, lead in enumerate(LEADS)}
+    whole = bootstrap([s.falsified for s in runs[PREDICTED]], study.seed)
+    law = f"share falsified of {COMMANDS:g} commands a second at random, 1 − exp(−rate · lead)"
     return [
-        _share_claim(text.format(LEADS[k], COMMANDS), "Section IV-A", LEADS[k], bootstrap(shares[:, k], study.seed))
-        for k in (1, 4, 6)
+        _share_claim(f"{SETTINGS[PREDICTED].title}: {law}", D_F + D_B, whole, D_B, measured),
+        *(
+            _share_claim(f"frames {lead:g} s ahead: {law}", lead, measured[lead], other, measured)
+            for lead, other in ((0.1, 0.2), (0.5, 0.2), (1.0, 0.5))
+        ),
     ]
 
 
-def _paint_leads(canvas: Canvas, study: Study, shares: np.ndarray) -> None:
+def _share_claim(text: str, lead: float, share: Estimate, other: float, measured: dict[float, Estimate]) -> Claim:
+    """It holds if the interval holds what's expected, or both are within 10 %: then they're called equal."""
+    expected = -float(np.expm1(-COMMANDS * lead))
+
+    def equal(share: Estimate) -> bool:
+        return share.low <= expected <= share.high or abs(share.value - expected) <= 0.1 * expected
+
+    beside = measured[other]
+    counterfactual = Counterfactual(f"frames {other:g} s ahead", beside.value, equal(beside), beside.interval)
+    source = f"Section IV-A; {OWN_BAR}"
+    return Claim(text, source, expected, share.value, equal(share), share.interval, counterfactual)
+
+
+def _paint_leads(canvas: Canvas, study: Study, shares: Array) -> None:
     ax = canvas.add_subplot()
     x = np.linspace(0.0, 1.6, 200)
     ax.plot(x, -100 * np.expm1(-COMMANDS * x), color=MUTED, label="1 − exp(−rate · lead)")

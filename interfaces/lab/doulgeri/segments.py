@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from interfaces.lab.claims import Claim, Findings, Results, Study, Table, at_most, none_of
+from interfaces.lab.claims import Claim, Counterfactual, Findings, Results, Study, Table, at_most, none_of
 from interfaces.lab.doulgeri.script import HOME, MODEL, target
 from interfaces.lab.output import BAD, MUTED, VIRTUAL, draw, legend
-from vrs import Engine, JointTarget, MotionCommand, PolynomialSegment, Profile, Timeline
+from vrs import Engine, Insertion, JointTarget, MotionCommand, PolynomialSegment, Profile, Stop, Timeline
 from vrs.model import Array, frozen_array
 
 if TYPE_CHECKING:
@@ -29,14 +31,38 @@ II_B: Final = "Section II-B"
 
 
 def example() -> Results:
-    """A move, and a second command in its linear segment; nothing is scheduled after it."""
-    engine = Engine(MODEL, q=HOME, clock=None)
-    engine.execute(MotionCommand(JointTarget(HOME + STEP), execute_at=0.5, speed=0.6))
+    """A move, and a second command in its linear segment; nothing is scheduled after it. Then the rivals."""
+    first = MotionCommand(JointTarget(HOME + STEP), execute_at=0.5, speed=0.6)
+    engine = planned(first)
     before = engine.timeline
     line = moving(before)[1]
     t_exec = line.start + 0.5 * line.duration
-    engine.execute(MotionCommand(JointTarget(GOAL), execute_at=t_exec, speed=0.6))
-    return Results(before=before, after=engine.timeline, t_exec=t_exec)
+    second = MotionCommand(JointTarget(GOAL), execute_at=t_exec, speed=0.6)
+    engine.execute(second)
+    after = engine.timeline
+    halted = planned(first)
+    halted.execute(Stop(execute_at=t_exec))
+    halted.execute(replace(second, execute_at=halted.timeline.end))
+    by_way = planned(first)
+    by_way.insert_via(1, second.target, execute_at=t_exec)
+    early = planned(first, replace(second, execute_at=t_exec - 0.5 * moving(after)[2].duration))
+    return Results(
+        before=before,
+        after=after,
+        t_exec=t_exec,
+        smooth=planned(replace(first, profile=Profile.JERK_LIMITED)).timeline,  # the first move, by another profile
+        halted=halted.timeline,  # braked first, and begun anew from rest
+        by_way=by_way.timeline,  # by the second target to the first, which is kept
+        early=early.timeline,  # the blend lies about t_exec
+    )
+
+
+def planned(*commands: MotionCommand) -> Engine:
+    """An engine that was given commands offline."""
+    engine = Engine(MODEL, q=HOME, clock=None)
+    for command in commands:
+        engine.execute(command)
+    return engine
 
 
 def moving(timeline: Timeline) -> tuple[PolynomialSegment, ...]:
@@ -50,10 +76,10 @@ def degree(segment: PolynomialSegment) -> int:
     return int(used[-1]) if len(used) else 0
 
 
-def jumps(timeline: Timeline) -> tuple[float, float]:
+def jumps(segments: Sequence[PolynomialSegment]) -> tuple[float, float]:
     """Largest jumps of position [rad] and velocity [rad/s] from one segment to the next."""
     worst = [0.0, 0.0]
-    for a, b in pairwise(timeline.segments):
+    for a, b in pairwise(segments):
         for k in range(2):
             gap = np.abs(a.value(a.end, derivative=k) - b.value(b.start, derivative=k)).max()
             worst[k] = max(worst[k], float(gap))
@@ -61,38 +87,99 @@ def jumps(timeline: Timeline) -> tuple[float, float]:
 
 
 def splice(rng: np.random.Generator) -> Results:
-    """Four moves, and a command somewhere in the first three, many times: what became of the moves after it."""
-    worst, tails, changed, uneven, past = [0.0, 0.0], 0, 0, 0.0, 0.0
+    """Four moves, and a command somewhere in the first three, many times: what became of the moves after it.
+
+    Beside it the rivals: a naive insertion, the tail planned anew, and a blend about t_exec.
+    """
+    seen, naive = [(0.0, 0.0)], [(0.0, 0.0)]
+    kept, anew = Tail(), Tail()
+    past, early_past = 0.0, 0.0
     for _ in range(MOVES):
         engine = Engine(MODEL, q=HOME, clock=None)
         profile = list(Profile)[rng.integers(2)]
+        commands = []
         for _ in range(4):
             t = engine.timeline.end + rng.uniform(0.0, 0.5)
-            engine.execute(MotionCommand(target(rng), execute_at=t, speed=rng.uniform(0.3, 1.0), profile=profile))
+            commands.append(MotionCommand(target(rng), execute_at=t, speed=rng.uniform(0.3, 1.0), profile=profile))
+            engine.execute(commands[-1])
         old = engine.timeline
         t_exec = float(rng.uniform(old.start, moving(old)[-1].start - 1e-3))
-        receipt = engine.execute(MotionCommand(target(rng), execute_at=t_exec, speed=rng.uniform(0.3, 1.0)))
+        command = MotionCommand(target(rng), execute_at=t_exec, speed=rng.uniform(0.3, 1.0))
+        receipt = engine.execute(command)
         new = engine.timeline
-        worst = [max(pair) for pair in zip(worst, jumps(new), strict=True)]
-        shifts = []
-        for owner in receipt.shifted:
-            pairs = zip(_of(old, owner), _of(new, owner), strict=True)
-            for a, b in pairs:
-                tails += 1
-                same = a.duration == b.duration and a.coefficients.tobytes() == b.coefficients.tobytes()
-                changed += not same
-                shifts.append(b.start - a.start)
-        uneven = max(uneven, float(np.ptp(shifts)) if shifts else 0.0)
-        early: Array = np.linspace(old.start, t_exec, 200)
-        past = max(past, float(np.abs(old.sample(early) - new.sample(early)).max()))
+        tail = {owner: commands[owner - 1] for owner in receipt.shifted}
+        seen.append(jumps(new.segments))
+        naive.append(jumps(naively(old, command, tuple(tail))))
+        kept.compare(old, {owner: _of(new, owner) for owner in tail})
+        anew.compare(old, planned_anew(old, command, tail))
+        blend = next(s for s in new.segments if s.command_id == receipt.command_id).duration
+        early = Engine(MODEL, timeline=old)
+        early.execute(replace(command, execute_at=max(t_exec - 0.5 * blend, old.start)))
+        t_past: Array = np.linspace(old.start, t_exec, 200)
+        before = old.sample(t_past)
+        past = max(past, float(np.abs(before - new.sample(t_past)).max()))
+        early_past = max(early_past, float(np.abs(before - early.timeline.sample(t_past)).max()))
     return Results(
-        position_jump=worst[0],
-        velocity_jump=worst[1],
-        tails=tails,  # tail segments that were compared
-        changed=changed,  # those whose coefficients or durations aren't the same bits
-        uneven=uneven,  # largest difference of the shifts within a tail [s]
+        jumps=tuple(max(column) for column in zip(*seen, strict=True)),  # of position [rad] and velocity [rad/s]
+        naive=tuple(max(column) for column in zip(*naive, strict=True)),
+        tail=kept,
+        anew=anew,
         past=past,  # largest change before t_exec [rad]
+        early=early_past,
     )
+
+
+def naively(old: Timeline, command: MotionCommand, tail: Sequence[int]) -> list[PolynomialSegment]:
+    """An insertion that knows neither velocity nor joining moves: the tail follows a move that begins at rest."""
+    t = command.execute_at
+    assert t is not None
+    head = [replace(s, duration=min(s.end, t) - s.start) for s in old.segments if s.start < t]
+    alone = Engine(MODEL, q=old.sample(t))
+    alone.execute(command)
+    made = list(moving(alone.timeline))
+    rest = [s for s in old.segments if s.command_id in tail]
+    shift = made[-1].end - rest[0].start if rest else 0.0
+    return head + made + [replace(s, start=s.start + shift) for s in rest]
+
+
+def planned_anew(
+    old: Timeline, command: MotionCommand, tail: dict[int, MotionCommand]
+) -> dict[int, list[PolynomialSegment]]:
+    """The tail's moves where each is planned once more, as soon as the one before it is over."""
+    engine = Engine(MODEL, timeline=old)
+    engine.execute(replace(command, insertion=Insertion.REPLACE))
+    made = {}
+    for owner, again in tail.items():
+        assert again.execute_at is not None
+        t = max(again.execute_at, engine.timeline.end)
+        receipt = engine.execute(replace(again, execute_at=t))
+        made[owner] = _of(engine.timeline, receipt.command_id)
+    return made
+
+
+class Tail:
+    """What became of the segments after an insertion."""
+
+    def __init__(self) -> None:
+        self.segments = 0
+        """How many were compared."""
+        self.changed = 0
+        """Those whose coefficients or durations aren't the same bits, or that aren't there."""
+        self.uneven = 0.0
+        """Largest difference of the shifts within a tail [s]."""
+
+    def compare(self, old: Timeline, new: dict[int, list[PolynomialSegment]]) -> None:
+        """Compare moves, by their commands, with what they were."""
+        shifts = []
+        for owner, segments in new.items():
+            for a, b in zip_longest(_of(old, owner), segments):
+                self.segments += 1
+                if a is None or b is None:
+                    self.changed += 1
+                    continue
+                self.changed += a.duration != b.duration or a.coefficients.tobytes() != b.coefficients.tobytes()
+                shifts.append(b.start - a.start)
+        self.uneven = max(self.uneven, float(np.ptp(shifts)) if shifts else 0.0)
 
 
 def _of(timeline: Timeline, owner: int) -> list[PolynomialSegment]:
@@ -103,49 +190,56 @@ def work(study: Study, _case: str) -> Findings:
     """Measure the figure, and many like it."""
     fig = example()
     s, new = moving(fig.before), moving(fig.after)
-    kept = s[0] == new[0]
-    head = new[1].start == s[1].start and np.array_equal(new[1].coefficients, s[1].coefficients)
     seen = [splice(np.random.default_rng((study.seed, 1, run))) for run in range(study.runs)]
-    position, velocity = max(r.position_jump for r in seen), max(r.velocity_jump for r in seen)
-    tails, changed = sum(r.tails for r in seen), sum(r.changed for r in seen)
-    uneven, past = max(r.uneven for r in seen), max(r.past for r in seen)
-    replaced = {segment.command_id for segment in new} == {1, 2} and new[-1].command_id == 2
-    end = float(np.abs(fig.after.sample(fig.after.end) - fig.after.segments[-1].value(fig.after.end)).max())
-    goal = float(np.abs(fig.after.sample(fig.after.end) - GOAL).max())
-    later = _appended()
+    position, velocity = np.max([r.jumps for r in seen], axis=0).tolist()
+    other_position, other_velocity = np.max([r.naive for r in seen], axis=0).tolist()
+    tails = sum(r.tail.segments for r in seen)
     many = f"{study.runs * MOVES} random splices"
+    naive = "a naive insertion: from rest, and no joining move"
+    anew = "each move of the tail planned anew"
+    centred = "a blend that lies about t_exec"
+    cut, other_cut = (_head(fig, after) for after in (fig.after, fig.early))
+    replaced, kept = (float(np.abs(after.sample(after.end) - GOAL).max()) for after in (fig.after, fig.by_way))
     claims = (
-        _degrees("a linear move with parabolic blends", s, "3: 2, 1, 2"),
-        _degrees("a second command in the linear segment", new, "5: 2, 1, 2, 1, 2"),
-        Claim(
-            "s1 stays as it is, s2' is s2 cut short at t_exec, s3' begins there",
-            FIG_1, "so",
-            f"s1 {_kept(kept)}, s2' {_kept(head)}, s3' begins {new[2].start - fig.t_exec:.1e} s after t_exec",
-            bool(kept and head and abs(new[1].end - fig.t_exec) <= SAME and abs(new[2].start - fig.t_exec) <= SAME),
+        _degrees(
+            "a linear move with parabolic blends", s, "3: 2, 1, 2", "jerk-limited blends", moving(fig.smooth)
+        ),
+        _degrees(
+            "a second command in the linear segment", new, "5: 2, 1, 2, 1, 2", "a stop first", moving(fig.halted)
         ),
         Claim(
+            "s1 stays as it is, s2' is s2 cut short at t_exec, s3' begins there",
+            FIG_1, "so", *cut, counterfactual=Counterfactual(centred, *other_cut),
+        ),
+        at_most(
             "with nothing scheduled after it the old target is replaced: distance of the end from the new [rad]",
-            FIG_1, "≤ 1e-9", max(goal, end), bool(replaced and max(goal, end) <= SAME),
+            FIG_1, SAME, replaced, ("the old target kept, the new one on the way", kept),
         ),
         at_most(
             f"continuity, a⁰ of s(i+1) = p of s(i) at its end: largest jump [rad], {many}",
-            "Section II, eq. (3)", SAME, position,
+            "Section II, eq. (3)", SAME, position, (naive, other_position),
         ),
-        at_most(f"velocity is continuous too: largest jump [rad/s], {many}", II_B, SAME, velocity),
+        at_most(
+            f"velocity is continuous too: largest jump [rad/s], {many}", II_B, SAME, velocity,
+            (naive, other_velocity),
+        ),
         none_of(
             f"the tail's coefficients and durations stay the same bits: segments that changed, of {tails}",
-            II_B, changed, of=tails,
+            II_B, sum(r.tail.changed for r in seen), (anew, sum(r.anew.changed for r in seen)), of=tails,
         ),
-        Claim(
+        at_most(
             f"the tail is shifted as one: largest difference of shifts [s], {many}",
-            II_B, "≤ 1e-9", uneven, uneven <= SAME and tails > 0,
+            II_B, SAME, max(r.tail.uneven for r in seen) if tails else np.inf,
+            (anew, max(r.anew.uneven for r in seen)),
         ),
         at_most(
             f"a command modifies the trajectory only from t_exec on: largest change before it [rad], {many}",
-            "Section II-B, eq. (5)", SAME, past,
+            "Section II-B, eq. (5)", SAME, max(r.past for r in seen), (centred, max(r.early for r in seen)),
         ),
         at_most(
-            "t_exec at or after the end of the last segment: new segments begin then, off by [s]", II_B, SAME, later
+            "t_exec at or after the end of the last segment: new segments begin then, off by [s]", II_B, SAME,
+            appended(Insertion.SPLICE),
+            ("appended at once, whatever t_exec", appended(Insertion.APPEND, asked=False)),
         ),
     )  # fmt: skip
     columns = ("segment", "start s", "end s", "degree", "a0 deg", "a1 deg/s", "a2 deg/s²")
@@ -156,17 +250,37 @@ def work(study: Study, _case: str) -> Findings:
     return Findings(claims, (table,), (picture,))
 
 
-def _degrees(what: str, segments: tuple[PolynomialSegment, ...], expected: str) -> Claim:
-    found = f"{len(segments)}: {', '.join(str(degree(segment)) for segment in segments)}"
-    return Claim(f"{what}: segments, and their degrees", FIG_1, expected, found, found == expected)
+def _degrees(
+    what: str,
+    segments: tuple[PolynomialSegment, ...],
+    expected: str,
+    rival: str,
+    others: tuple[PolynomialSegment, ...],
+) -> Claim:
+    found, other = (f"{len(x)}: {', '.join(str(degree(segment)) for segment in x)}" for x in (segments, others))
+    beside = Counterfactual(rival, other, other == expected)
+    return Claim(
+        f"{what}: segments, and their degrees", FIG_1, expected, found, found == expected, counterfactual=beside
+    )
 
 
-def _appended() -> float:
-    """How far from t_exec a move begins that comes after all others [s]."""
+def _head(fig: Results, after: Timeline) -> tuple[str, bool]:
+    """What became of the first two segments, and where the third begins; whether that's as in the figure."""
+    old, new = moving(fig.before), moving(after)
+    kept = old[0] == new[0]
+    head = new[1].start == old[1].start and np.array_equal(new[1].coefficients, old[1].coefficients)
+    late = new[2].start - fig.t_exec
+    whole = bool(kept and head and abs(new[1].end - fig.t_exec) <= SAME and abs(late) <= SAME)
+    return f"s1 {_kept(kept)}, s2' {_kept(head)}, s3' begins {late:.1e} s after t_exec", whole
+
+
+def appended(how: Insertion, *, asked: bool = True) -> float:
+    """How far from t_exec a move begins that comes after all others [s]; it may be given without t_exec."""
     engine = Engine(MODEL, q=HOME, clock=None)
     engine.execute(MotionCommand(JointTarget(HOME + 0.2), execute_at=0.5))
     t_exec = engine.timeline.end + 0.7
-    receipt = engine.execute(MotionCommand(JointTarget(HOME), execute_at=t_exec))
+    command = MotionCommand(JointTarget(HOME), execute_at=t_exec if asked else None, insertion=how)
+    receipt = engine.execute(command)
     return abs(_of(engine.timeline, receipt.command_id)[0].start - t_exec)
 
 
