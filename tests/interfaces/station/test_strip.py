@@ -216,34 +216,57 @@ def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     says(page, "#load", "take control first")
 
 
-def test_a_plan_with_a_via_and_a_rounded_corner_takes_the_same_path_once_loaded(page: Page, tmp_path: Path) -> None:
-    page.take_control().rest()
-    clear(page)
+NEWEST = "station.session.orders.entries.at(-1).outcome?.receipt"
+PATH = """(count) => { const { timeline } = station.session;
+    const ids = [...new Set(timeline.segments.map(({ commandId }) => commandId))].slice(-count);
+    const { start } = timeline.segments.find(({ commandId }) => commandId === ids[0]);
+    const times = Array.from({ length: 200 }, (_, k) => start + (k * (timeline.end - start)) / 199);
+    return [timeline.end - start, times.map((t) => timeline.joints(t))]; }"""
+"""How long the newest commands' moves take, and places on their way."""
+
+
+def path(page: Page, count: int) -> tuple[float, list[list[float]]]:
+    """What `PATH` says, once the page knows the newest."""
+    page.wait(f"Math.abs(station.session.timeline.end - {NEWEST}?.end) < 1e-9")
+    found: tuple[float, list[list[float]]] = page.page.evaluate(PATH, count)
+    return found
+
+
+def round_a_corner(page: Page) -> tuple[float, list[list[float]]]:
+    """Plan a move by a via, and one that passes its end; their path."""
     move = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 60, 0.3)
     page.page.click("#zoom-out")
     page.page.click("#zoom-out")
     page.page.locator(f".move[data-id='{move}']").press("Enter")
     page.page.select_option("#via-place", "stretch")
     page.page.click("#via")
-    page.page.evaluate("""() => { window.given = station.session.order({ type: 'move', insertion: 'append',
-        speed: 0.4, deviation: 0.1, target: { type: 'joints', q: [0.3, 1.2, -2.2, 0, 0.5, 0] } }, 'corner'); }""")
-    page.wait("Math.abs(station.session.timeline.end - given.outcome?.receipt?.end) < 1e-9")
-    assert page.get("given.outcome.receipt.reason.includes('passes the via within')")
-    path = """(() => { const { timeline, now } = station.session;
-        const { start } = timeline.segments.find(({ start, commandId }) => commandId !== null && start > now);
-        const times = Array.from({ length: 200 }, (_, k) => start + (k * (timeline.end - start)) / 199);
-        return [timeline.end - start, times.map((t) => timeline.joints(t))]; })()"""
-    lasted, was = page.get(path)
-    with page.page.expect_download() as download:
-        page.page.click("#save")
-    saved = tmp_path / "saved.jsonl"
-    download.value.save_as(saved)
-    clear(page)
-    page.page.set_input_files("#plan-file", saved)
-    page.page.click("#load-append")
-    page.wait("station.polite === '3 moves are planned'")
-    until(lambda: len(scheduled(page)) == 3)
-    lasts, found = page.get(path)
+    page.wait(f"{NEWEST}?.reason.includes('goes by a via')")
+    page.page.evaluate("""() => station.session.order({ type: 'move', insertion: 'append', speed: 0.4,
+        deviation: 0.1, target: { type: 'joints', q: [0.3, 1.2, -2.2, 0, 0.5, 0] } }, 'corner')""")
+    page.wait(f"{NEWEST}?.reason.includes('passes the via within')")
+    return path(page, 2)
+
+
+def test_a_plan_with_a_via_and_a_rounded_corner_takes_the_same_path_once_loaded(page: Page, tmp_path: Path) -> None:
+    page.take_control()
+    # Where the virtual robot is put right, so is what is planned: then once more.
+    for _ in range(4):
+        page.rest()
+        known = page.get(CORRECTIONS)
+        lasted, was = round_a_corner(page)
+        with page.page.expect_download() as download:
+            page.page.click("#save")
+        saved = tmp_path / "saved.jsonl"
+        download.value.save_as(saved)
+        clear(page)
+        page.page.set_input_files("#plan-file", saved)
+        page.page.click("#load-append")
+        page.wait("station.polite === '3 moves are planned'")
+        lasts, found = path(page, 3)
+        if page.get(CORRECTIONS) == known:
+            break
+        page.page.evaluate("station.announce('')")
+        clear(page)
     assert lasts == pytest.approx(lasted, abs=1e-6)
     assert max(math.dist(*pair) for pair in zip(found, was, strict=True)) < 1e-6
     clear(page)
