@@ -81,15 +81,16 @@ def name(architecture: str, transport: Transport) -> str:
 
 
 def case_of(
-    robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float
+    robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float, body: str = ""
 ) -> DriveCase:
-    """A run of the table."""
+    """A run of the table; the bodies in physics in another world than the usual one where it's named."""
     if robot == IDEAL:
         reality = MobileReality.ideal(dt=1 / 60)
         return DriveCase(
             architecture, transport, f"{profile}@{TAU}", "bare", seed=seed, length=length, reality=reality
         )
-    return DriveCase(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
+    named = f"{robot}@{body}" if body else robot
+    return DriveCase(architecture, transport, f"{profile}@{TAU}", named, seed=seed, length=length)
 
 
 def seen(drive: DriveRun) -> ArchitectureResult:
@@ -120,7 +121,8 @@ def work(study: Study, case: str) -> Results:
     for architecture, transport in COMPOSITIONS:
         found = []
         for k in range(study.runs):
-            drive = run(case_of(robot, profile, architecture, transport, study.seed + k, study.length))
+            seed = study.seed + k
+            drive = run(case_of(robot, profile, architecture, transport, seed, study.length, study.body))
             found.append(seen(drive))
             if k == 0 and case in DRAWN:
                 first[name(architecture, transport)] = drive
