@@ -10,6 +10,7 @@ import typer
 
 from interfaces.cli.demo import prepare
 from interfaces.cli.options import Workers, argument, bars, option
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
@@ -39,10 +40,18 @@ def reproduce(
         list[Path] | None,
         option(
             "FILE",
-            "What is claimed beyond the papers, for the page: benchmarks/results.json, or the summary.json of "
-            "vrs lab localization; repeatable.",
+            "What is claimed beyond the papers, for the page: benchmarks/results.json, the summary.json of vrs lab "
+            "localization, or PAPER.json of another --body; repeatable.",
         ),
     ] = None,
+    body: Annotated[
+        str,
+        option(
+            "bullet|mujoco",
+            "World of physics that the robots are in, instead of the usual one; only claims on such robots are "
+            "measured.",
+        ),
+    ] = "",
     workers: Workers = 2,
     as_json: Annotated[
         bool, option("--json", "Write PAPER.json on standard output too, a document a paper.")
@@ -53,11 +62,13 @@ def reproduce(
     from interfaces.lab.output import to_json, write
     from interfaces.report.claims import read_verdicts, write_claims
 
-    chosen = papers(paper)
+    chosen = tuple(found for each in papers(paper) if (found := each.in_world(body)).parts)
+    if not chosen:
+        raise InvalidValueError("body", body, f"left out of {paper}: no robot in it has physics")
     more = [found for path in beyond or () for found in read_verdicts(path)]
     prepare(out, "reproduce.html", *(f"{each.name}.json" for each in chosen))
     studies = [
-        (each, Study(seed, each.runs if runs is None else runs, each.length if length is None else length))
+        (each, Study(seed, each.runs if runs is None else runs, each.length if length is None else length, body))
         for each in chosen
     ]
     made = [(found, write(found, out)) for found in measured(studies, workers)]

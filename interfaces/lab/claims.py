@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from types import SimpleNamespace
 from typing import Annotated, Any, TypeAlias
 
 from interfaces.lab.statistics import Estimate
-from vrs.checks import finite, validated, within
+from robots.simulated import WORLDS
+from vrs.checks import finite, one_of, validated, within
 from vrs.errors import InvalidValueError
 
 OWN_BAR = "our own bar"
@@ -42,8 +43,11 @@ class Study:
     """Runs behind each random figure, 2 to 1000."""
     length: float = 20.0
     """For how long each run's operator gives commands [s], 2 to 3600."""
+    body: str = ""
+    """World of physics that robots with a body in one have it in; the usual one unless given."""
 
     def __post_init__(self) -> None:
+        one_of("body", self.body, ("", *WORLDS))
         if not 2 <= finite("length", self.length, "2 to 3600 s") <= 3600:
             raise InvalidValueError("length", self.length, "2 to 3600 s")
 
@@ -254,6 +258,8 @@ class PaperPart:
     conclude: Callable[[Study, tuple[Any, ...]], Findings] = _only
     """Makes findings of what was measured, a value a case; unless given, the only case makes them itself."""
     cases: tuple[str, ...] = ("",)
+    physical: bool = False
+    """Whether robots with physics have part in it, so that `Study.body` makes a difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,6 +274,10 @@ class Paper:
     """Behind each random figure, unless said otherwise."""
     length: float = 20.0
     """For how long each run's operator gives commands, unless said otherwise [s]."""
+
+    def in_world(self, body: str) -> Paper:
+        """The paper itself, or where a world of physics is named, what of it robots with physics have part in."""
+        return replace(self, parts=tuple(part for part in self.parts if part.physical or not body))
 
 
 @dataclass(frozen=True, slots=True)

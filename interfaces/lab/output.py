@@ -115,6 +115,7 @@ def to_json(reproduction: Reproduction) -> str:
         "seed": study.seed,
         "runs": study.runs,
         "length_s": study.length,
+        **({"body": study.body} if study.body else {}),
         "claims": [_claim(claim) for claim in found.claims],
         "tables": [
             {

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from interfaces.lab.claims import Verdict
+from interfaces.lab.claims import Verdict, said
 from interfaces.lab.output import SCHEMA
 from interfaces.report.pages import page
 from interfaces.system import read_within, written
@@ -82,11 +82,15 @@ def read_verdicts(path: Path) -> tuple[ClaimReport, ...]:
 
 def _study(path: Path, document: Json) -> ClaimReport:
     length = f"{document['length_s']:g} s"
-    facts = ("seed", str(document["seed"])), ("runs", str(document["runs"])), ("length", length)
+    facts = [("seed", str(document["seed"])), ("runs", str(document["runs"])), ("length", length)]
+    name, title = document["paper"], document["citation"]
+    if body := document.get("body", ""):
+        facts.append(("body", body))
+        name, title = f"{name}@{body}", f"{title}: with bodies in {body}"
     return ClaimReport(
-        document["paper"],
-        document["citation"],
-        facts,
+        name,
+        title,
+        tuple(facts),
         tuple(map(_claim, document["claims"])),
         tuple(map(_claim, document["timings"])),
         tuple({**each, "rows": [list(map(_cell, row)) for row in each["rows"]]} for each in document["tables"]),
@@ -135,6 +139,38 @@ def _measured(name: str, result: Json) -> Json:
     }
 
 
+def in_worlds(found: ClaimReport, others: Sequence[ClaimReport]) -> ClaimReport:
+    """Return a paper's claims with a table of what they come to in other worlds of physics.
+
+    Args:
+        found: The paper's.
+        others: Among them those of the same paper with bodies in other worlds; without any, there's no table.
+    """
+    worlds = {
+        other.name.partition("@")[2]: {claim["claim"]: _verdict(claim) for claim in other.claims}
+        for other in others
+        if other.name.startswith(f"{found.name}@")
+    }
+    rows = [
+        [
+            claim["claim"],
+            claim["expected"],
+            _verdict(claim),
+            *(them.get(claim["claim"], "") for them in worlds.values()),
+        ]
+        for claim in found.claims
+        if any(claim["claim"] in them for them in worlds.values())
+    ]
+    if not rows:
+        return found
+    table = {"title": "In which world", "columns": ["claim", "expected", "usual body", *worlds], "rows": rows}
+    return replace(found, tables=(table, *found.tables))
+
+
+def _verdict(claim: Json) -> str:
+    return f"{said(claim['measured'])}: {claim['verdict']}"
+
+
 PAGE: Final = "reproduce.html"
 DATA: Final = "reproduce.json"
 CLAIMS_SCHEMA: Final = "vrs-claims/2"
@@ -154,6 +190,7 @@ def write_claims(out: Path, papers: Sequence[ClaimReport], beyond: Sequence[Clai
     Raises:
         FormatError: If the directory can't hold them.
     """
+    papers = [in_worlds(found, (*papers, *beyond)) for found in papers]
     with written(out, "can't hold the results"):
         (out / DATA).write_text(to_json(papers, beyond), encoding="utf-8")
         (out / PAGE).write_text(render(papers, beyond), encoding="utf-8", newline="\n")

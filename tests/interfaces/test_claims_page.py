@@ -14,7 +14,7 @@ from interfaces.cli.main import exit_status
 from interfaces.lab import Claim, Findings, Paper, Reproduction, Study, Table
 from interfaces.lab.claims import OWN_BAR, Counterfactual, Figure, Verdict
 from interfaces.lab.output import write
-from interfaces.report.claims import COLUMNS, DATA, read_verdicts, render, write_claims
+from interfaces.report.claims import COLUMNS, DATA, in_worlds, read_verdicts, render, write_claims
 from vrs.errors import FormatError
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks" / "results.json"
@@ -75,6 +75,24 @@ def test_every_claim_comes_through_with_all_that_it_says(paper, tmp_path):
     rows = [attributes.get("class") for tag, attributes in read(page.read_text()).seen if tag == "tr"]
     for verdict in Verdict:
         assert rows.count(verdict[0]) == sum(counts[verdict] for counts in document["counts"].values())
+
+
+def test_a_claim_says_in_which_world_it_holds(paper, tmp_path):
+    elsewhere = tmp_path / "mujoco"
+    elsewhere.mkdir()
+    found = Findings((replace(CLAIMS[0], measured=2.6, met=False), replace(CLAIMS[1], claim="another")))
+    other = write(Reproduction(Paper("toy", "Nobody: Nothing", ()), Study(seed=4, body="mujoco"), found), elsewhere)
+    (usual,), (mujoco,) = read_verdicts(paper), read_verdicts(other)
+    assert mujoco.facts[-1] == ("body", "mujoco")
+    assert in_worlds(mujoco, [usual, mujoco]) is mujoco
+    table, rows = in_worlds(usual, [usual, mujoco]).tables
+    assert rows == usual.tables[0]
+    assert table["columns"][-2:] == ["usual body", "mujoco"]
+    assert table["rows"] == [["it <b>holds</b> [cm]", 2.0, "2: holds", "2.6: doesn't hold"]]
+    page = write_claims(tmp_path, [usual], [mujoco]).read_text()
+    read(page)
+    assert "In which world" in page
+    assert "with bodies in mujoco" in page
 
 
 def test_the_page_is_safe_whole_and_asks_nobody_for_anything(paper):

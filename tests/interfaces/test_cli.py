@@ -174,6 +174,7 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path, how):
         (("robot", "--body", "jelly"), "puma560"),
         (("robot", "--robot", "ipr", "--body", "ideal"), "ipr must be one of bullet, mujoco, bare"),
         (("serve", "--robot", "ipr", "--robot", "micro", "--body", "ideal"), "body of ipr must be one of"),
+        (("reproduce", "doulgeri", "--body", "mujoco", "--out", "out"), "no robot in it has physics"),
         (("lab", "--robot", "ipr@jelly", "--out", "lab"), "body of ipr must be one of"),
         (("robot", "--pose", "lotus"), "nominal"),
         (("robot", "--offset", "fixed"), "fixed:S"),

@@ -27,7 +27,7 @@ from interfaces.lab.doulgeri import (
     rivals,
     segments,
 )
-from interfaces.lab.output import rich_tables, write
+from interfaces.lab.output import rich_tables, to_json, write
 from interfaces.lab.runner import joined
 from interfaces.lab.statistics import bootstrap, median
 from tests.interfaces.lab.test_doulgeri_claims import but
@@ -119,8 +119,25 @@ class TestHouse:
         with pytest.raises(InvalidValueError, match="doulgeri, han2001, kim2002, kim2006, tipsuwan, all"):
             papers("nobody")
 
+    def test_of_a_world_of_physics_what_robots_have_part_in_is_measured(self):
+        parts = {name: [part.title for part in paper.in_world("mujoco").parts] for name, paper in PAPERS.items()}
+        assert parts == {
+            "doulgeri": [], "han2001": ["Architectures"], "kim2002": ["The scenario"], "kim2006": [],
+            "tipsuwan": ["Controllers", "Success"],
+        }  # fmt: skip
+        assert TOY.in_world("") == TOY
+        made = reproduce(TOY, Study(body="mujoco"))
+        assert json.loads(to_json(made))["body"] == "mujoco"
+
     def test_misuse(self):
-        for options in ({"seed": -1}, {"runs": 1}, {"length": 1.0}, {"length": np.nan}, {"runs": 2.5}):
+        for options in (
+            {"seed": -1},
+            {"body": "jelly"},
+            {"runs": 1},
+            {"length": 1.0},
+            {"length": np.nan},
+            {"runs": 2.5},
+        ):
             with pytest.raises(InvalidValueError):
                 Study(**options)
         with pytest.raises(InvalidValueError):

@@ -14,7 +14,7 @@ PAPER: Final = Paper(
     (
         PaperPart("Information loss", information.work),
         PaperPart("Command filter", information.work_filter),
-        PaperPart("Architectures", architectures.work, architectures.conclude, architectures.CASES),
+        PaperPart("Architectures", architectures.work, architectures.conclude, architectures.CASES, physical=True),
     ),
     length=120.0,
 )

@@ -104,21 +104,22 @@ def name(architecture: str, transport: Transport) -> str:
 
 
 def case_of(
-    robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float
+    robot: str, profile: str, architecture: str, transport: Transport, seed: int, length: float, body: str = ""
 ) -> DriveCase:
-    """A run of the table."""
+    """A run of the table; the bodies in physics in another world than the usual one where it's named."""
     if robot == IDEAL:
         reality = MobileReality.ideal(dt=1 / 60)
         return DriveCase(
             architecture, transport, f"{profile}@{TAU}", "bare", seed=seed, length=length, reality=reality
         )
-    return DriveCase(architecture, transport, f"{profile}@{TAU}", robot, seed=seed, length=length)
+    named = f"{robot}@{body}" if body else robot
+    return DriveCase(architecture, transport, f"{profile}@{TAU}", named, seed=seed, length=length)
 
 
-def rivals(case: str, seed: int, length: float) -> Iterator[tuple[str, DriveCase]]:
+def rivals(case: str, seed: int, length: float, body: str) -> Iterator[tuple[str, DriveCase]]:
     """What else is run of a case, by name: what a claim's mechanism is switched off in, or its rival."""
     robot, profile = case.split()
-    of = partial(case_of, robot, profile, seed=seed, length=length)
+    of = partial(case_of, robot, profile, seed=seed, length=length, body=body)
     if robot == "ipr":
         for who in ("III", OPEN_LOOP):
             yield name(who, Transport.DATAGRAMS), of(who, Transport.DATAGRAMS)
@@ -166,12 +167,13 @@ def work(study: Study, case: str) -> Results:
     for architecture, transport in COMPOSITIONS:
         found = []
         for k in range(study.runs):
-            drive = run(case_of(robot, profile, architecture, transport, study.seed + k, study.length))
+            seed = study.seed + k
+            drive = run(case_of(robot, profile, architecture, transport, seed, study.length, study.body))
             found.append(seen(drive))
             if k == 0 and case in DRAWN:
                 first[name(architecture, transport)] = drive
         runs[name(architecture, transport)] = tuple(found)
-    others = [dict(rivals(case, study.seed + k, study.length)) for k in range(study.runs)]
+    others = [dict(rivals(case, study.seed + k, study.length, study.body)) for k in range(study.runs)]
     for who in others[0]:
         runs[who] = tuple(seen(run(each[who])) for each in others)
     return Results(runs=runs, first=first)

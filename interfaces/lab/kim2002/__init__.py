@@ -16,7 +16,11 @@ PAPER: Final = Paper(
     "Kim, Han, Kim, Kim: Internet-Based Personal Robot System using Map-Based Localization",
     (
         PaperPart(
-            "The scenario", scenario.measure, scenario.conclude, tuple(str(k) for k in range(scenario.TOGETHER))
+            "The scenario",
+            scenario.measure,
+            scenario.conclude,
+            tuple(str(k) for k in range(scenario.TOGETHER)),
+            physical=True,
         ),
         PaperPart("Localization", measure_room, conclude_rooms, ROOMS),
     ),

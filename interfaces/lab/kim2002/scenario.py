@@ -1,7 +1,7 @@
 """Section 5: A to B before the door, "Hello!", a message, a book put on top, the key, back to A; and its claims.
 
 The home, its doors, who walks in it and who brings the book go by the clock; the robot, its laser, its localization
-and the list of jobs are those that run live. The book is a body of its own in PyBullet.
+and the list of jobs are those that run live. The book is a body of its own, in the robot's world of physics.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from robots.mobile.chassis import Senses
 from robots.mobile.robot import place
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
+from robots.robot import USUAL_BASE, load
 from robots.vehicle import Cargo
 from vrs.mobile import wrapped
 
@@ -71,18 +72,17 @@ def home(rng: np.random.Generator) -> Room:
     return replace(room, doors=(front, *inside), people=(guest, walker))
 
 
-def play(seed: int) -> Results:
-    """Run the scenario in PyBullet, in virtual time.
+def play(seed: int, body: str = "") -> Results:
+    """Run the scenario with physics, in virtual time.
 
     Args:
         seed: Of the robot's noise and slip, and of when and how fast somebody walks by.
+        body: Of the robot, by its world; the usual one unless given.
     """
-    from robots.mobile.body import MobileBody
-
     room = home(np.random.default_rng([seed, 1]))
     senses = Senses(camera=None, laser=LaserModel())
-    with MobileBody(IPR, room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as body:
-        return _played(room, body)
+    with load(USUAL_BASE).body(body)(room=room, rng=np.random.default_rng([seed, 2]), senses=senses) as robot:
+        return _played(room, robot)
 
 
 def _played(room: Room, body: MobileBody) -> Results:
@@ -194,7 +194,8 @@ TOGETHER: Final = 5
 def measure(study: Study, case: str) -> tuple[Results, ...]:
     """Each `TOGETHER`-th run from the case's number on."""
     numbers = range(int(case), study.runs, TOGETHER)
-    return tuple(play(int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0])) for k in numbers)
+    seeds = (int(np.random.SeedSequence([study.seed, k]).generate_state(1)[0]) for k in numbers)
+    return tuple(play(seed, study.body) for seed in seeds)
 
 
 def conclude(study: Study, measured: tuple[tuple[Results, ...], ...]) -> Findings:

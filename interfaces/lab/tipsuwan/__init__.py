@@ -12,8 +12,8 @@ PAPER: Final = Paper(
     "Tipsuwan, Chow: Model Predictive Path Tracking via Middleware for Networked Mobile Robot over IP Network",
     (
         PaperPart("Gain", gain.work),
-        PaperPart("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES),
-        PaperPart("Success", success.work, success.conclude, success.CASES),
+        PaperPart("Controllers", wrapping.work, wrapping.conclude, wrapping.CASES, physical=True),
+        PaperPart("Success", success.work, success.conclude, success.CASES, physical=True),
         PaperPart("Shorter paths", success.work_shorter, success.conclude_shorter, success.SHORTER_CASES),
         PaperPart("Where it stops", extent.work, extent.conclude, extent.CASES),
     ),

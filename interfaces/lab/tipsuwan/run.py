@@ -29,6 +29,7 @@ from robots.mobile.robot import BareBody, MobileRobot
 from robots.onboard.curve import Curve
 from robots.onboard.curve_trackers import QuadraticCurveTracker, QuadraticTrackerConfig
 from robots.onboard.driving import Posture
+from robots.robot import load
 from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import DriveLimits, clipped
 from vrs.model import Array
@@ -156,7 +157,7 @@ class NetworkControl(enum.StrEnum):
 
 
 ROBOTS: Final = ("kinematic", "ipr")
-"""The paper's robot, an exact unicycle; and the IPR in PyBullet, as real as it is."""
+"""The paper's robot, an exact unicycle; and the IPR with physics, as real as it is."""
 
 
 LAGS: Final = {"kinematic": 0.0, "ipr": 0.05}
@@ -182,6 +183,8 @@ class NetworkRunSetting:
     """T: between two sampling times [s], in [1e-4, 1]."""
     length: Annotated[float, within(0.1, 3600.0, "s")] = LENGTH
     """Of a run [s], in [0.1, 3600]."""
+    body: str = ""
+    """Of the IPR, by its world of physics; the usual one unless given."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -243,17 +246,17 @@ def behind(control: NetworkControl, controller: Controller, config: MiddlewareCo
     )
 
 
-def make_robot(kind: str, start: tuple[float, float, float], period: float, seed: int) -> tuple[MobileRobot, int]:
+def make_robot(
+    kind: str, start: tuple[float, float, float], setting: NetworkRunSetting, seed: int
+) -> tuple[MobileRobot, int]:
     """Put a robot in its place, which sees nothing; and how many of its steps are a sampling time."""
+    period = setting.period
     if one_of("robot", kind, ROBOTS) == "kinematic":
         reality = MobileReality.ideal(dt=period)
         return BareBody(IPR, start, reality=reality, limits=UNBOUND, senses=_BLIND, period=period), 1
-    from robots.mobile.body import MobileBody
-
     steps = max(round(period / _IPR_STEP), 1)
     reality = MobileReality(dt=period / steps)
-    made = MobileBody(
-        IPR,
+    made: MobileRobot = load(kind).body(setting.body)(
         start,
         reality=reality,
         limits=LIFTED,
@@ -286,7 +289,7 @@ def run(
         start: Where the robot begins.
     """
     setting = NetworkRunSetting() if setting is None else setting
-    body, steps = make_robot(robot, start, setting.period, seed)
+    body, steps = make_robot(robot, start, setting, seed)
     there_rng, back_rng = np.random.default_rng([seed, 5]).spawn(2)
     there: Channel[DriveSetpoint | Probe] = Channel(Conditions(delay=delay), there_rng)
     back: Channel[DriveFeedback | Echo] = Channel(Conditions(delay=delay), back_rng)

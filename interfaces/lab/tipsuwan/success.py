@@ -83,7 +83,7 @@ def work(study: Study, case: str) -> PathSuccess:
 
 def ran(study: Study, robot: str, curve: Curve, controls: Sequence[NetworkControl]) -> PathSuccess:
     """Some controls and all delay seeds of a robot on a path."""
-    setting = NetworkRunSetting(length=study.length)
+    setting = NetworkRunSetting(length=study.length, body=study.body)
     ideal = run(
         curve, agent(NetworkControl.DIRECT, curve, setting), no_delay(), study.seed, robot=robot, setting=setting
     )

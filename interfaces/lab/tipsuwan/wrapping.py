@@ -77,7 +77,7 @@ CASES: Final = tuple(f"{robot}/{name}" for robot in ROBOTS for name in CONTROLLE
 def work(study: Study, case: str) -> dict[str, tuple[PathMeasures, ...]]:
     """A controller on a robot: without delay, with delay alone, and behind the middleware; a run a path each."""
     robot, name = case.split("/")
-    setting = NetworkRunSetting(length=study.length)
+    setting = NetworkRunSetting(length=study.length, body=study.body)
     found: dict[str, list[PathMeasures]] = {}
     for path in range(min(PATHS, study.runs)):
         number = 1000 * study.seed + path

@@ -89,6 +89,15 @@ def test_no_drive_breaks_the_tolerance():
     assert J.max() > 0.2
 
 
+def test_the_ipr_is_driven_in_another_world():
+    curve, ends = s_path(0), []
+    for body in ("bullet", "mujoco"):
+        setting = NetworkRunSetting(length=0.3, body=body)
+        driver = agent(NetworkControl.EXACT, curve, setting, "ipr")
+        ends.append(run(curve, driver, no_delay(), 1, robot="ipr", setting=setting).postures[-1])
+    assert 0.0 < math.dist(*ends) < 2e-3
+
+
 def test_half_a_middleware_is_worse_than_a_whole_one():
     whole = driven(NetworkControl.EXACT, network_of(1))
     for predicts in (True, False):
