@@ -144,7 +144,14 @@ class TrialPilot:
         return self._before
 
 
-def travel(group: str, setting: TripSetting, mapped: float, true: float) -> Trip:
+def travel(
+    group: str,
+    setting: TripSetting,
+    mapped: float,
+    true: float,
+    aboard: Aboard | None = None,
+    limit: float = math.inf,
+) -> Trip:
     """Let a robot look about, tell it where to go, and drive until it's there or gives up.
 
     Args:
@@ -152,16 +159,20 @@ def travel(group: str, setting: TripSetting, mapped: float, true: float) -> Trip
         setting: Who is to go where.
         mapped: Length of the shortest way on the map [m].
         true: Of the shortest way as things stood at first [m].
+        aboard: What another robot has on board for comparison; its trip ends where it touches something.
+        limit: And after so long [s].
     """
     with body_of(setting) as body:
-        pilot = TrialPilot(body)
+        pilot = TrialPilot(body, aboard)
         while body.time < FIRST_LOOK - 1e-9:
             pilot.step()
         begun, goal = body.time, setting.goal
         pilot.go(goal)
         journey = pilot.journey
         planned = route_map(setting.room, body.chassis.footprint).route(body.truth[:2], (goal.x, goal.y))
-        while journey.state in GOING:
+        while journey.state in GOING and body.time < begun + limit:
+            if aboard is not None and body.collisions:
+                break
             pilot.step()
         x, y, theta = body.truth
         track = np.array(pilot.track)
