@@ -144,6 +144,12 @@ def at_least(
     return _bounded(claim, source, f"≥ {_number(bar)}{note}", measured, without, lambda end: end >= bar)
 
 
+def between(claim: str, source: str, low: float, high: float, measured: Measured, without: Without = None) -> Claim:
+    """A claim that a figure, and both ends of its interval, lie from one bar to another; see `at_most`."""
+    expected = f"{_number(low)} to {_number(high)}"
+    return _bounded(claim, source, expected, measured, without, lambda end: low <= end <= high)
+
+
 def above(claim: str, source: str, bar: float, measured: Measured, without: Without = None) -> Claim:
     """A claim that a figure, and the lower end of its interval, is more than a bar; see `at_most`."""
     return _bounded(claim, source, f"> {_number(bar)}", measured, without, lambda end: end > bar)

@@ -43,7 +43,7 @@ def route_config(body: Footprint) -> RouteConfig:
     return RouteConfig(turning, outline.half_width)
 
 
-def route_map(room: Room, body: Footprint) -> RouteMap:
+def route_map(room: Room, body: Footprint, kind: type[RouteMap] = RouteMap) -> RouteMap:
     """The ways that a robot knows: of a room's plan, as far as that is known."""
     known = room.known()
     things = [*(_corners(b.x, b.y, b.angle, b.length, b.width) for b in known.blocks)]
@@ -51,7 +51,7 @@ def route_map(room: Room, body: Footprint) -> RouteMap:
     turns = np.arange(_ROUND) * math.tau / _ROUND
     ring = out * np.column_stack([np.cos(turns), np.sin(turns)])
     things += [c.radius * ring + (c.x, c.y) for c in known.columns]
-    return RouteMap((room.length, room.width), things, route_config(body), via=room.via)
+    return kind((room.length, room.width), things, route_config(body), via=room.via)
 
 
 def _corners(x: float, y: float, angle: float, length: float, width: float) -> Array:
@@ -62,16 +62,24 @@ def _corners(x: float, y: float, angle: float, length: float, width: float) -> A
 class BodyNavigator:
     """A navigator on a robot's own odometry, laser and sonars."""
 
-    def __init__(self, body: MobileRobot, period: float) -> None:
+    def __init__(
+        self,
+        body: MobileRobot,
+        period: float,
+        ways: type[RouteMap] = RouteMap,
+        navigator: type[Navigator] = Navigator,
+    ) -> None:
         """Take a robot with a laser scanner and sonars.
 
         Args:
             body: The robot.
             period: Between two drives [s].
+            ways: What finds its ways; another one for comparison.
+            navigator: What decides; another one for comparison.
         """
         room = body.room
         shape = math.ceil(room.length / CELL - 1e-9), math.ceil(room.width / CELL - 1e-9)
-        ways = route_map(room, body.chassis.footprint)
+        roads = route_map(room, body.chassis.footprint, ways)
         outline, (near, far) = outline_of(body.chassis.footprint), body.chassis.sonar_reach
         mounts, sonar = mounts_of(body), body.senses.sonar
         half_cone = 0.0 if sonar is None else sonar.half_angle
@@ -80,7 +88,7 @@ class BodyNavigator:
         )
         movers = MoversConfig(mounts, half_cone=half_cone)
         self._body = body
-        self.navigator = Navigator(ways, Grid(shape, CELL), avoidance, movers, YieldingConfig(outline))
+        self.navigator = navigator(roads, Grid(shape, CELL), avoidance, movers, YieldingConfig(outline))
         """What decides."""
 
     def drive(self, posture: Posture, *, v_before: float) -> Drive:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
@@ -288,9 +289,20 @@ def nearest_lines(known: Lines, placed: Lines) -> tuple[NDArray[np.int64], NDArr
 class PaperLocalizer:
     """Dead reckoning, corrected by the paper's update after each scan."""
 
-    def __init__(self, known: GspMap, posture: tuple[float, float, float]) -> None:
-        """Begin at a posture (x, y, θ) [m, m, rad] in a map."""
-        self._known = known.lines
+    def __init__(
+        self,
+        known: GspMap,
+        posture: tuple[float, float, float],
+        update: Callable[[Lines, Lines, NDArray[np.int64]], Array] = injected_update,
+    ) -> None:
+        """Begin at a posture in a map.
+
+        Args:
+            known: The map.
+            posture: (x, y, θ) [m, m, rad].
+            update: Δp of known and seen lines; another of the paper's for comparison.
+        """
+        self._known, self._update = known.lines, update
         self.posture = posture
         """Where the robot is taken to be, (x, y, θ) [m, m, rad]."""
         self._extraction = ExtractionConfig()
@@ -312,7 +324,7 @@ class PaperLocalizer:
             mine, of = nearest_lines(self._known, placed)
             if not len(mine):
                 break
-            step = injected_update(self._known, placed.taken(mine), of)
+            step = self._update(self._known, placed.taken(mine), of)
             x, y, theta = self.posture
             self.posture = x + float(step[0]), y + float(step[1]), theta + float(step[2])
             if np.abs(step).max() < _ENOUGH:

@@ -232,13 +232,17 @@ class Localizer:
         if not enough and now < self._since + config.patience:
             return
         self._looked = now
-        places = self._candidates = locate(self._known, surveyor.surroundings(), config.search)
+        places = self._candidates = self._located(surveyor)
         if len(places) != 1:
             self._becomes(Status.AMBIGUOUS if places else Status.SEARCHING)
         elif self._confirmed(places[0], surveyor):
             self._go_on(places[0], surveyor)
         else:
             self._surveyor = Surveyor()
+
+    def _located(self, surveyor: Surveyor) -> tuple[Candidate, ...]:
+        """Where it may be, by all that it has seen."""
+        return locate(self._known, surveyor.surroundings(), self._config.search)
 
     def _confirmed(self, place: Candidate, surveyor: Surveyor) -> bool:
         """Whether the last scan fits there, too: a robot that was held has lost itself in its own frame."""

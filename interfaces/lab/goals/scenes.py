@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
@@ -218,7 +218,7 @@ class Shortest:
         # From middle to middle: a thing's edge is half a cell nearer.
         clearance: Array = distance_transform_edt(~taken)[1:-1, 1:-1] * CELL - CELL / 2
         self._free = clearance >= radius
-        self._graph = self._edges()
+        self._graph = self._edges(_NEIGHBOURS)
 
     def length(self, begin: tuple[float, float], end: tuple[float, float]) -> float:
         """Of the shortest way from place to place [m]; infinite if there's none."""
@@ -238,17 +238,24 @@ class Shortest:
         places = np.column_stack(np.divmod(cells[::-1], m)).astype(float)
         return min(float(ways[target]), self._cut(places))
 
+    def length_along_axes(self, begin: tuple[float, float], end: tuple[float, float]) -> float:
+        """Of the shortest way that goes along x and y alone [m]; infinite if there's none."""
+        from scipy.sparse.csgraph import dijkstra
+
+        (i, j), (k, m), n = self._cell(begin), self._cell(end), self._free.shape[1]
+        return float(dijkstra(self._edges(_NEIGHBOURS[:2]), directed=False, indices=i * n + j)[k * n + m])
+
     def _cell(self, place: tuple[float, float]) -> tuple[int, int]:
         i, j = (min(max(int(x / CELL), 0), n - 1) for x, n in zip(place, self._free.shape, strict=True))
         return i, j
 
-    def _edges(self) -> Any:
+    def _edges(self, neighbours: Sequence[tuple[int, int]]) -> Any:
         from scipy.sparse import coo_matrix
 
         m, n = self._free.shape
         number = np.arange(m * n).reshape(m, n)
         rows, columns, ways = [], [], []
-        for di, dj in _NEIGHBOURS:
+        for di, dj in neighbours:
             a = slice(0, m - di), slice(max(0, -dj), n - max(0, dj))
             b = slice(di, m), slice(max(0, dj), n + min(0, dj))
             both = self._free[a] & self._free[b]

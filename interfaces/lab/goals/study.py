@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,13 @@ from interfaces.lab.claims import (
     Reproduction,
     Study,
     Table,
+    at_least,
+    at_most,
+    none_of,
 )
+from interfaces.lab.goals.rivals import HEEDLESS, IMPATIENT, MAPPED, STRAIGHT
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND, SHUT, TITLES, Shortest, setting
-from interfaces.lab.goals.trial import Trip, seen_all, travel
+from interfaces.lab.goals.trial import Aboard, Trip, seen_all, travel
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, write_runs
 from interfaces.lab.statistics import Estimate, bootstrap, median
 from robots.bullet.rooms import Block, Column, Room
@@ -104,8 +108,38 @@ SHARES: Final = {ROUND: 0.25, LATE: 0.15, SHUT: 0.05, PEOPLE: 0.1, PHYSICS: 0.2}
 """Trips of each group as shares of those; the rest of them is of `FURNITURE`."""
 ASKED: Final = (FURNITURE, ROUND, LATE)
 """Groups that make them up."""
-REACHED, LONGER = 0.99, 1.15
-"""Share of goals that are to be reached; how much longer than the shortest a route may be."""
+REACHED, LONGER = 99.0, 1.15
+"""Share of goals that are to be reached [%]; how much longer than the shortest a route may be."""
+SOURCE: Final = f"section 4.1; {OWN_BAR}"
+NO_AVOIDANCE, NO_DETOUR, NO_OTHER, NO_WAITING = (
+    "no avoidance",
+    "straight to the goal",
+    "the map's way alone",
+    "no waiting",
+)
+RIVALS: Final[dict[str, dict[str, Aboard]]] = {
+    FURNITURE: {NO_DETOUR: STRAIGHT, NO_AVOIDANCE: HEEDLESS},
+    ROUND: {NO_OTHER: MAPPED},
+    LATE: {NO_WAITING: IMPATIENT},
+    SHUT: {NO_OTHER: MAPPED},
+    PEOPLE: {},
+    PHYSICS: {NO_DETOUR: STRAIGHT, NO_AVOIDANCE: HEEDLESS},
+}
+"""Robots that lack something, by what they lack, and in which groups they are sent, too."""
+COMPARED = 5
+"""They're sent on each so manieth trip."""
+PATIENCE = 10.0
+"""They may take so much longer than ours [s]."""
+
+
+class Measured(NamedTuple):
+    """A trip, and what it's held against."""
+
+    trip: Trip
+    rivals: dict[str, Trip]
+    """The same of robots that lack something, by what; none on most trips."""
+    along_axes: float
+    """Length of the shortest way along x and y alone [m]; nan on most trips."""
 
 
 def study_of(goals: int) -> Paper:
@@ -125,7 +159,7 @@ def study_of(goals: int) -> Paper:
     )
 
 
-def measure(study: Study, case: str) -> Trip:
+def measure(study: Study, case: str) -> Measured:
     """A trip; the case is its group and number."""
     group, number = case.split(":")
     chosen = setting(group, study.seed, int(number))
@@ -133,39 +167,38 @@ def measure(study: Study, case: str) -> Trip:
     # A disc as wide as the robot, with what its routes keep free on either side.
     needed = route_config(load(USUAL_BASE).base.body)
     radius = needed.half_width + needed.margin
-    mapped, true = (
-        Shortest(room, radius).length(begin, end) for room in (chosen.room.known(), seen_all(chosen.room))
-    )
-    return travel(group, chosen, mapped, true)
+    known = Shortest(chosen.room.known(), radius)
+    mapped, true = known.length(begin, end), Shortest(seen_all(chosen.room), radius).length(begin, end)
+    trip = travel(group, chosen, mapped, true)
+    if int(number) % COMPARED:
+        return Measured(trip, {}, math.nan)
+    limit = trip.time + PATIENCE
+    rivals = {what: travel(group, chosen, mapped, true, aboard, limit) for what, aboard in RIVALS[group].items()}
+    return Measured(trip, rivals, known.length_along_axes(begin, end))
 
 
-def conclude_asked(study: Study, found: tuple[Trip, ...]) -> Findings:
-    """What the issue asks for, of the goals among furniture and doors."""
-    _, touched = _count(found)
+def conclude_asked(study: Study, measured: tuple[Measured, ...]) -> Findings:
+    """What is asked of the goals among furniture and doors."""
+    found = _trips(measured)
     known = _ratios(found)
     long = len(found) - sum(ratio <= LONGER for ratio in known)
-    middle = bootstrap(known, study.seed, median) if known else Estimate(math.nan, math.nan, math.nan)
-    blocked = [one for one in found if one.group == ROUND]
-    rerouted = sum(one.arrived for one in blocked)
-    late = [one for one in found if one.group == LATE]
-    waited = sum(one.arrived for one in late)
-    total = len(found)
+    axes = [one.along_axes / one.trip.mapped for one in measured if math.isfinite(one.along_axes)]
+    middle, other = (
+        bootstrap(ratios, study.seed, median) if ratios else Estimate(math.nan, math.nan, math.nan)
+        for ratios in (known, axes)
+    )
+    what = f"ways along x and y alone, {len(axes)} trips"
+    blocked, late = ([one for one in measured if one.trip.group == group] for group in (ROUND, LATE))
     claims = (
-        _reached(found, math.ceil(REACHED * total - 1e-9)),
-        Claim("goals on whose way something was touched", OWN_BAR, "0", touched, touched == 0),
-        Claim(
-            "routes on the map, by the shortest way: median", OWN_BAR, f"≤ {LONGER:g}", middle.value,
-            middle.value <= LONGER, middle.interval,
+        _reached(measured),
+        _untouched(measured),
+        at_most("routes on the map, by the shortest way: median", SOURCE, LONGER, middle, (what, other)),
+        none_of(
+            f"routes of {len(found)} that are longer than {LONGER:g} times that", SOURCE, long,
+            (what, sum(ratio > LONGER for ratio in axes)),
         ),
-        Claim(f"routes of {total} that are longer than {LONGER:g} times that", OWN_BAR, "0", long, long == 0),
-        Claim(
-            f"blocked doors of {len(blocked)} that the robot went round", OWN_BAR, f"{len(blocked)}", rerouted,
-            rerouted == len(blocked),
-        ),
-        Claim(
-            f"doors of {len(late)} that it waited for", OWN_BAR, f"{len(late)}", waited,
-            waited == len(late),
-        ),
+        _share(f"of {len(blocked)} blocked doors the robot went round [%]", 100, arrived, blocked, NO_OTHER),
+        _share(f"of {len(late)} doors it waited for [%]", 100, arrived, late, NO_WAITING),
     )  # fmt: skip
     groups = dict.fromkeys(one.group for one in found)
     rows = tuple(_row(group, [one for one in found if one.group == group]) for group in groups)
@@ -173,30 +206,29 @@ def conclude_asked(study: Study, found: tuple[Trip, ...]) -> Findings:
     return Findings(claims, (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_shut(_study: Study, found: tuple[Trip, ...]) -> Findings:
+def conclude_shut(_study: Study, measured: tuple[Measured, ...]) -> Findings:
     """Where there's no way the robot says so."""
-    clear = sum(one.state is JourneyState.FAILED and one.problem is RouteProblem.NO_WAY for one in found)
-    total = len(found)
-    claim = Claim(
-        f"goals of {total} behind a closed door that were given up with the reason", OWN_BAR, f"{total}", clear,
-        clear == total,
-    )  # fmt: skip
+
+    def says_so(one: Trip) -> bool:
+        return one.state is JourneyState.FAILED and one.problem is RouteProblem.NO_WAY
+
+    what = f"of {len(measured)} goals behind a closed door, given up with the reason [%]"
+    claim = _share(what, 100, says_so, measured, NO_OTHER)
+    found = _trips(measured)
     return Findings((claim,), (_each(found),), tuple(maps(found)))
 
 
-def conclude_people(_study: Study, found: tuple[Trip, ...]) -> Findings:
+def conclude_people(_study: Study, measured: tuple[Measured, ...]) -> Findings:
     """Among people who stop for nobody nothing is asked of touches: they run into robots that stand."""
+    found = _trips(measured)
     table = Table("with people", TITLES[PEOPLE], COLUMNS, (_row(PEOPLE, found),))
     return Findings((), (table, _each(found)), tuple(maps(found)))
 
 
-def conclude_physics(_study: Study, found: tuple[Trip, ...]) -> Findings:
+def conclude_physics(_study: Study, measured: tuple[Measured, ...]) -> Findings:
     """The same with physics."""
-    _, touched = _count(found)
-    claims = (
-        _reached(found, math.ceil(REACHED * len(found) - 1e-9), " in PyBullet"),
-        Claim("goals in PyBullet on whose way something was touched", OWN_BAR, "0", touched, touched == 0),
-    )
+    found = _trips(measured)
+    claims = _reached(measured, " in PyBullet"), _untouched(measured, " in PyBullet")
     return Findings(claims, (_each(found),), tuple(maps(found)))
 
 
@@ -207,10 +239,34 @@ COLUMNS: Final = (
 """Of the table of groups; medians unless they say otherwise."""
 
 
-def _reached(found: Sequence[Trip], least: int, where: str = "") -> Claim:
-    reached, _ = _count(found)
-    what = f"goals of {len(found)}{where} reached within 5 cm and 2 deg"
-    return Claim(what, OWN_BAR, f"≥ {least}", reached, reached >= least)
+def _trips(measured: Sequence[Measured]) -> tuple[Trip, ...]:
+    return tuple(one.trip for one in measured)
+
+
+def _share(
+    what: str, bar: float, good: Callable[[Trip], bool], measured: Sequence[Measured], lacking: str
+) -> Claim:
+    """So many trips are to be good, and fewer of a robot that lacks something."""
+    rivals = [one.rivals[lacking] for one in measured if lacking in one.rivals]
+    share, other = (
+        100 * sum(map(good, trips)) / len(trips) if trips else math.nan for trips in (_trips(measured), rivals)
+    )
+    return at_least(what, SOURCE, bar, share, (f"{lacking}, {len(rivals)} trips", other) if rivals else None)
+
+
+def arrived(one: Trip) -> bool:
+    """Whether a trip led to its goal."""
+    return one.arrived
+
+
+def _reached(measured: Sequence[Measured], where: str = "") -> Claim:
+    what = f"of {len(measured)} goals{where} reached within 5 cm and 2 deg [%]"
+    return _share(what, REACHED, arrived, measured, NO_DETOUR)
+
+
+def _untouched(measured: Sequence[Measured], where: str = "") -> Claim:
+    what = f"of {len(measured)} trips{where} without a touch [%]"
+    return _share(what, 100, lambda one: not one.touched, measured, NO_AVOIDANCE)
 
 
 def _count(found: Sequence[Trip]) -> tuple[int, int]:

@@ -10,12 +10,13 @@ import numpy as np
 from robots.bullet.rooms import Room
 from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.navigation import BodyNavigator, route_map
-from robots.mobile.position import LaserPosition
+from robots.mobile.position import LaserPosition, OdometryPosition
 from robots.mobile.robot import Collision, MobileRobot
 from robots.onboard.driving import STAND, Drive, kept
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
-from robots.onboard.routes import Route, RouteProblem
+from robots.onboard.navigator import Navigator
+from robots.onboard.routes import Route, RouteMap, RouteProblem
 from robots.robot import BARE, USUAL_BASE, load
 from vrs.mobile import wrapped
 from vrs.model import Array
@@ -95,14 +96,27 @@ def body_of(setting: TripSetting, reality: MobileReality | None = None) -> Mobil
     return body
 
 
+@dataclass(frozen=True, slots=True)
+class Aboard:
+    """What a robot finds its way with; the product's own, but for what a counterfactual has in its place."""
+
+    position: type[LaserPosition | OdometryPosition] = LaserPosition
+    """Says where it is."""
+    ways: type[RouteMap] = RouteMap
+    """Finds its ways."""
+    navigator: type[Navigator] = Navigator
+    """Decides."""
+
+
 class TrialPilot:
     """Drives a robot with its navigator, on the posture that its laser gives; notes what happens."""
 
-    def __init__(self, body: MobileRobot) -> None:
+    def __init__(self, body: MobileRobot, aboard: Aboard | None = None) -> None:
         """Take a robot with a laser scanner and sonars."""
         self.body = body
-        self._position = LaserPosition(body)
-        self._on_board = BodyNavigator(body, CONTROL)
+        aboard = Aboard() if aboard is None else aboard
+        self._position = aboard.position(body)
+        self._on_board = BodyNavigator(body, CONTROL, aboard.ways, aboard.navigator)
         self.journey = self._on_board.navigator.journey
         """Its goal, its route, how far it is."""
         self.posture = self._position.posture()
@@ -130,7 +144,14 @@ class TrialPilot:
         return self._before
 
 
-def travel(group: str, setting: TripSetting, mapped: float, true: float) -> Trip:
+def travel(
+    group: str,
+    setting: TripSetting,
+    mapped: float,
+    true: float,
+    aboard: Aboard | None = None,
+    limit: float = math.inf,
+) -> Trip:
     """Let a robot look about, tell it where to go, and drive until it's there or gives up.
 
     Args:
@@ -138,16 +159,20 @@ def travel(group: str, setting: TripSetting, mapped: float, true: float) -> Trip
         setting: Who is to go where.
         mapped: Length of the shortest way on the map [m].
         true: Of the shortest way as things stood at first [m].
+        aboard: What another robot has on board for comparison; its trip ends where it touches something.
+        limit: And after so long [s].
     """
     with body_of(setting) as body:
-        pilot = TrialPilot(body)
+        pilot = TrialPilot(body, aboard)
         while body.time < FIRST_LOOK - 1e-9:
             pilot.step()
         begun, goal = body.time, setting.goal
         pilot.go(goal)
         journey = pilot.journey
         planned = route_map(setting.room, body.chassis.footprint).route(body.truth[:2], (goal.x, goal.y))
-        while journey.state in GOING:
+        while journey.state in GOING and body.time < begun + limit:
+            if aboard is not None and body.collisions:
+                break
             pilot.step()
         x, y, theta = body.truth
         track = np.array(pilot.track)

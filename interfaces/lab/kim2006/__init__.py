@@ -14,6 +14,7 @@ PAPER: Final = Paper(
     (
         PaperPart("Variable packet size", packets.work),
         PaperPart("Path following", links.work, links.conclude, links.CASES),
+        PaperPart("Size alone", links.work_sizes, links.conclude_sizes, links.SIZE_CASES),
         PaperPart("Narrow links", links.work_narrow, links.conclude_narrow, links.NARROW_CASES),
     ),
     length=30.0,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from interfaces.lab.kim2006.schemes import Rims, scheme
 from interfaces.link.conditions import Conditions, LinkConditions
-from interfaces.link.delays import delay_profile
+from interfaces.link.delays import DelayProfile, delay_profile
 from interfaces.link.link import Link
 from interfaces.link.losses import loss_model
 from interfaces.rsp.model import RobotModel, read_model
@@ -45,7 +45,7 @@ FIRE: Final = 0.5
 AFTER: Final = 5.0
 """A run goes on for this after the path's end [s]."""
 RESEND: Final = 0.2
-"""TCP sends again after so long [s]: the least that Linux allows, in TCP's favour."""
+"""TCP sends again after so long [s], at the latest: the least that Linux allows, whatever the round trip."""
 BODIES: Final = ("cubo", "bare")
 """The body in PyBullet, and the same chassis without physics."""
 
@@ -68,6 +68,8 @@ class FollowingCase:
     """Of either direction [bit/s]."""
     adaptive: bool = False
     """Whether RSP fits T to the link."""
+    music: Annotated[float, within(0.0, 1.0)] = 0.0
+    """Share of the time in which music plays, in [0, 1]."""
 
     def __post_init__(self) -> None:
         scheme(self.scheme)
@@ -162,6 +164,21 @@ def path_leader(path: Array) -> Callable[[Posture], Rims]:
     return rims
 
 
+def plays(t: float, length: float, share: float) -> bool:
+    """Whether music plays at a time [s]: three pieces, each in a third of the length [s], that end with it."""
+    third = length / 3.0
+    # In whole periods, so that the share is what was asked for.
+    return math.floor(t % third / TICK + 0.5) * TICK >= third * (1.0 - share) - 1e-9
+
+
+def resend_after(profile: DelayProfile) -> float:
+    """When TCP sends again what was lost [s]: by the acknowledgements of three later packets, or at `RESEND`.
+
+    In TCP's favour: a median round trip at most, no acknowledgement is lost, and nothing slows it down.
+    """
+    return min(RESEND, 2 * profile.quantile(0.5) + 3 * TICK)
+
+
 def make_body(case: FollowingCase) -> MobileRobot:
     """The real robot of a case, at the path's start."""
     rng, reality = np.random.default_rng([case.seed, 1]), MobileReality(dt=0.004)
@@ -183,11 +200,12 @@ def run(case: FollowingCase) -> Followed:
     chosen = scheme(case.scheme)
     bytes_rng = np.random.default_rng([case.seed, 3])
     local, robot = chosen.ends(cubo_model(), bytes_rng.bytes, case.adaptive)
+    profile = delay_profile(case.delay)
     conditions = Conditions(
-        delay=delay_profile(case.delay),
+        delay=profile,
         loss=loss_model(str(case.loss)),
         service=chosen.service,
-        retransmit_after=RESEND,
+        retransmit_after=resend_after(profile),
         bandwidth=case.bandwidth,
         queue_packets=200,
     )
@@ -213,9 +231,12 @@ def run(case: FollowingCase) -> Followed:
             if k % round(FIRE / TICK) == 0 and now < case.length:
                 given.append(now)
                 local.fire()
+            if case.music and now < case.length and plays(now, case.length, case.music):
+                local.play()
             for data in local.to_send(now=now):
-                down += len(data)
-                link.forward.send(data, now, len(data) + chosen.header)
+                size = max(len(data), chosen.least[0])
+                down += size
+                link.forward.send(data, now, size + chosen.header)
             left, right = robot.drive(now=now)
             for number in robot.fired():
                 fired.setdefault(number, now)
@@ -223,8 +244,9 @@ def run(case: FollowingCase) -> Followed:
                 ages.append(now - robot.stamp)
             robot.measure(position.posture())
             for data in robot.to_send(now=now):
-                up += len(data)
-                link.backward.send(data, now, len(data) + chosen.header)
+                size = max(len(data), chosen.least[1])
+                up += size
+                link.backward.send(data, now, size + chosen.header)
             v, w = 0.5e-3 * (left + right), 1e-3 * (right - left) / p.WHEEL_BASE
             body.drive(clipped(v, p.LIMITS.v_max), clipped(w, p.LIMITS.w_max), steps)
     leader = np.vstack([path, np.repeat(path[-1:], len(way) - len(path), axis=0)])

@@ -71,6 +71,9 @@ class PlainLocal:
         self._fires.append(self._count)
         self._count += 1
 
+    def play(self) -> None:
+        """Give a period's music: in a packet of one size there's room for it, whether there's any or not."""
+
     def receive(self, data: bytes, _now: float) -> None:
         """Take a packet; what is older than the newest is of no use."""
         number, x, y, theta = _UP.unpack_from(data)
@@ -168,6 +171,7 @@ class RspLocal:
         """Newest posture that came."""
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
         self._fire, self._position = model.index("ir_fire"), model.index("position")
+        self._speaker = model.index("speaker")
         self.core.request(self._position, True)
         sensor = model.elements[self._position]
         assert isinstance(sensor, Sensor)
@@ -184,6 +188,13 @@ class RspLocal:
         """Give a command: something that is to be done once; before there's a session it waits."""
         self._waiting.append(bytes([self._number % 256]))
         self._number += 1
+
+    def play(self) -> None:
+        """Give a period's music; what the robot has no buffer for is left out."""
+        if self.core.streams.credit > len(self.core.streams):
+            speaker = self.core.model.elements[self._speaker]
+            assert isinstance(speaker, Effector)
+            self.core.play(self._speaker, bytes(speaker.stream))
 
     def receive(self, data: bytes, now: float) -> None:
         """Take a packet."""
@@ -210,7 +221,7 @@ class RspRobot:
         """Wait for a session."""
         self.core = RobotCore(model, random_bytes, config)
         self._left, self._right = model.index("left_wheel"), model.index("right_wheel")
-        self._position = model.index("position")
+        self._position, self._speaker = model.index("position"), model.index("speaker")
         sensor = model.elements[self._position]
         assert isinstance(sensor, Sensor)
         self._sensor = sensor
@@ -223,6 +234,7 @@ class RspRobot:
     def drive(self, *, now: float) -> Rims:
         """What the wheels do from now on [s]."""
         self.core.effectors(now=now)
+        self.core.streams.take(self._speaker)
         self._commands += [output.id for output in self.core.take() if isinstance(output, Commanded)]
         left, right = (self.core.motion.given(index)[0] for index in (self._left, self._right))
         return int(left), int(right)
@@ -267,6 +279,8 @@ class Scheme:
     """What the network adds to a packet [byte]."""
     ends: Callable[[RobotModel, Callable[[int], bytes], bool], Ends]
     """Makes both ends, of what gives random bytes, and whether RSP fits T to the link."""
+    least: tuple[int, int] = (0, 0)
+    """Packets to the robot and from it are filled up to these sizes [byte]."""
 
 
 def _rsp(model: RobotModel, random_bytes: Callable[[int], bytes], adaptive: bool) -> Ends:
@@ -293,9 +307,12 @@ SCHEMES: Final[dict[str, Scheme]] = {
         Scheme("fixed", Service.DATAGRAM, UDP_HEADER, _plain(1, FIXED_DOWN, FIXED_UP)),
         Scheme("tcp", Service.IN_ORDER, TCP_HEADER, _plain(1, FIXED_DOWN, FIXED_UP)),
         Scheme("repeated", Service.DATAGRAM, UDP_HEADER, _plain(REPEATS, 0, 0)),
+        Scheme("stream", Service.IN_ORDER, TCP_HEADER, _rsp),
+        Scheme("padded", Service.DATAGRAM, UDP_HEADER, _rsp, (FIXED_DOWN, FIXED_UP)),
     )
 }
-"""RSP; packets of one size on UDP, on TCP; inputs repeated without acknowledgement."""
+"""RSP; packets of one size on UDP, on TCP; inputs repeated without acknowledgement; RSP's packets on TCP, and RSP's
+packets on UDP that are filled up to one size."""
 
 
 def scheme(name: str) -> Scheme:

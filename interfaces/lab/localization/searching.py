@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
-from interfaces.lab.claims import OWN_BAR, Cell, Claim, Findings, Results, Study, Table, at_least, at_most
-from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
+from interfaces.lab.claims import OWN_BAR, Cell, Findings, Results, Study, Table, all_of, at_least, at_most
+from interfaces.lab.localization.trial import CONTROL, PostureErrors, body_of, drive, setting, wander
 from robots.bullet.rooms import Room, read_room
 from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
 from robots.onboard.driving import Drive
-from robots.onboard.localizer import Localizer, Status
+from robots.onboard.global_localization import Candidate
+from robots.onboard.localizer import Localizer, LocalizerConfig, Status
+from robots.onboard.map_building import Surveyor
 from vrs.mobile import wrapped
 from vrs.model import Array
 
@@ -124,8 +128,32 @@ NOTICED, RECOVERED = 3.0, 40.0
 """It has to notice within [s]; and to be found again within [s]."""
 
 
+UNDOUBTING: Final = LocalizerConfig(through=1.0, explained=0.0)
+"""Of one that is never lost, whatever it sees."""
+LONG_ENOUGH = 5.0
+"""So long a filter that was begun anywhere may take to come right [s]."""
+
+
+class FirstPlaceLocalizer(Localizer):
+    """Goes on at the place that fits best, however well another one fits."""
+
+    @override
+    def _located(self, surveyor: Surveyor) -> tuple[Candidate, ...]:
+        return super()._located(surveyor)[:1]
+
+
 ANSWERS: Final = ("right", "wrong", "ambiguous", "none")
 """What is said of a start."""
+
+
+class Starts(NamedTuple):
+    """Of an apartment."""
+
+    room: str
+    answers: Counter[str]
+    """How many starts got which of `ANSWERS`."""
+    guessed: Counter[str]
+    """What a filter says that was begun at a place drawn from the room, of the first start."""
 
 
 @cache
@@ -144,11 +172,8 @@ def _mapped(room: Room) -> Room:
     return Room(room.name, room.length, room.width, room.start, room.known().blocks)
 
 
-def measure_starts(study: Study, case: str) -> tuple[str, Counter[str]]:
-    """A distinctive apartment's name, and how many starts in it got which of `ANSWERS`.
-
-    The case is its number and how many.
-    """
+def measure_starts(study: Study, case: str) -> Starts:
+    """Starts in a distinctive apartment; the case is its number and how many."""
     number, count = map(int, case.split(":"))
     room = _distinctive(study.seed, number)
     places = Ways(room, CLEAR).places
@@ -157,20 +182,33 @@ def measure_starts(study: Study, case: str) -> tuple[str, Counter[str]]:
     for k in range(count):
         x, y = places[int(rng.integers(len(places)))].tolist()
         posture = x, y, float(rng.uniform(-math.pi, math.pi))
-        answers[_start(room, number, (study.seed, number, 20 + k), posture)] += 1
-    return room.name, answers
+        seed = study.seed, number, 20 + k
+        answers[_start(room, number, seed, posture, Localizer(plan_map(room)))] += 1
+        if k == 0:
+            first = seed, posture
+    seed, posture = first
+    x, y = places[int(rng.integers(len(places)))].tolist()
+    anywhere = x, y, float(rng.uniform(-math.pi, math.pi))
+    guess = Localizer(plan_map(room), anywhere, config=UNDOUBTING)
+    return Starts(room.name, answers, Counter([_start(room, number, seed, posture, guess, LONG_ENOUGH)]))
 
 
-def _start(room: Room, number: int, seed: tuple[int, ...], posture: tuple[float, float, float]) -> str:
-    """Turn on the spot at a posture until it's found; the answer."""
+def _start(
+    room: Room,
+    number: int,
+    seed: tuple[int, ...],
+    posture: tuple[float, float, float],
+    localizer: Localizer,
+    least: float = 0.0,
+) -> str:
+    """Turn on the spot at a posture until it's found, and so long at least [s]; the answer."""
     chosen = setting(room, number, 0.03, seed)
-    localizer = Localizer(plan_map(room))
     with body_of(chosen, posture) as body:
         while body.time < PATIENCE:
             localizer.move(body.time, body.reckoned)
             if body.laser is not None:
                 localizer.see(body.laser)
-            if localizer.status is Status.TRACKING:
+            if localizer.status is Status.TRACKING and body.time >= least:
                 break
             body.drive(0.0, TURN, round(CONTROL / body.reality.dt))
         return answer_of(localizer, body.truth)
@@ -185,16 +223,25 @@ def answer_of(localizer: Localizer, truth: tuple[float, float, float]) -> str:
     return "right" if near else "wrong"
 
 
-def conclude_starts(_study: Study, found: tuple[tuple[str, Counter[str]], ...]) -> Findings:
-    """How many were found."""
-    count = sum((answers for _, answers in found), Counter[str]())
-    starts = count.total()
+def conclude_starts(_study: Study, found: tuple[Starts, ...]) -> Findings:
+    """How many were found, beside a filter that begins anywhere."""
+    count = sum((one.answers for one in found), Counter[str]())
+    guessed = sum((one.guessed for one in found), Counter[str]())
+    starts, without = count.total(), f"tracking from anywhere, {guessed.total()} starts"
+
+    def share(of: Counter[str], answer: str) -> float:
+        return 100 * (of[answer] / of.total())
+
     claims = (
-        at_least(f"of {starts} starts found [%]", OWN_BAR, 95, 100 * (count["right"] / starts)),
-        at_most("wrong and confident [%]", OWN_BAR, 1, 100 * (count["wrong"] / starts)),
-    )
+        at_least(
+            f"of {starts} starts found [%]", OWN_BAR, 95, share(count, "right"), (without, share(guessed, "right"))
+        ),
+        at_most(
+            "wrong and confident [%]", OWN_BAR, 1, share(count, "wrong"), (without, share(guessed, "wrong"))
+        ),
+    )  # fmt: skip
     rows: list[list[tuple[str, Cell]]] = [
-        [("apartment", room), *((what, answers[what]) for what in ANSWERS)] for room, answers in found
+        [("apartment", one.room), *((what, one.answers[what]) for what in ANSWERS)] for one in found
     ]
     return Findings(claims, (Table.of("starts", f"starts anywhere, {STARTS} an apartment at most", rows),))
 
@@ -209,16 +256,29 @@ def symmetric(number: int) -> Room:
     )
 
 
-def measure_symmetric(study: Study, case: str) -> Results:
-    """A turn on the spot in a symmetric room."""
+class Twice(NamedTuple):
+    """The same measured twice."""
+
+    ours: Results
+    rival: Results
+    """Without what is claimed."""
+
+
+def measure_symmetric(study: Study, case: str) -> Twice:
+    """A turn on the spot in a symmetric room, heard by one that takes the first place, too."""
     number = int(case)
     room = symmetric(number)
     chosen = setting(room, number, 0.03, (study.seed, number, 13))
-    localizer = Localizer(plan_map(room))
+    both = Localizer(plan_map(room)), FirstPlaceLocalizer(plan_map(room))
     with body_of(chosen) as body:
-        drive(body, PATIENCE, lambda _, __: Drive(0.0, TURN), {"": localizer})
-        localizer.move(body.time, body.reckoned)
+        drive(body, PATIENCE, lambda _, __: Drive(0.0, TURN), dict(zip(("ours", "rival"), both, strict=True)))
+        for one in both:
+            one.move(body.time, body.reckoned)
         truth = body.truth
+    return Twice(*(_named(one, room, truth) for one in both))
+
+
+def _named(localizer: Localizer, room: Room, truth: tuple[float, float, float]) -> Results:
     offs = [math.dist(one.posture[:2], truth[:2]) for one in localizer.candidates]
     return Results(
         room=room.name,
@@ -229,9 +289,15 @@ def measure_symmetric(study: Study, case: str) -> Results:
     )
 
 
-def conclude_symmetric(_study: Study, found: tuple[Results, ...]) -> Findings:
-    """Whether it said so."""
-    good = sum(one.status is Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in found)
+def conclude_symmetric(_study: Study, measured: tuple[Twice, ...]) -> Findings:
+    """Whether it said so, beside one that takes the first place."""
+
+    def good(those: Sequence[Results]) -> int:
+        return sum(
+            one.status is Status.AMBIGUOUS and one.named == one.expected and one.off <= NEAR for one in those
+        )
+
+    found, rivals = zip(*measured, strict=True)
     rows = [
         (
             ("room", one.room),
@@ -244,13 +310,13 @@ def conclude_symmetric(_study: Study, found: tuple[Results, ...]) -> Findings:
     ]
     what = f"of {len(found)} symmetric rooms called ambiguous, with all places that look the same"
     return Findings(
-        (Claim(what, OWN_BAR, len(found), good, good == len(found)),),
+        (all_of(what, OWN_BAR, good(found), len(found), ("the place that fits best taken", good(rivals))),),
         (Table.of("symmetric", "rooms that look the same from several places", rows),),
     )
 
 
-def measure_carried(study: Study, case: str) -> Results:
-    """Drive, be carried off, drive on; turn on the spot when the localizer wants it."""
+def measure_carried(study: Study, case: str) -> Twice:
+    """Drive, be carried off, drive on; turn on the spot when the localizer wants it; one without doubt hears it."""
     number = int(case)
     room = _distinctive(study.seed, number)
     rng = np.random.default_rng([study.seed, number, 17])
@@ -258,6 +324,7 @@ def measure_carried(study: Study, case: str) -> Results:
     places = Ways(room, CLEAR).places
     with body_of(chosen) as body:
         localizer, driver, carried = Localizer(plan_map(room), body.truth), wander(chosen), [0.0]
+        sure = Localizer(plan_map(room), body.truth, config=UNDOUBTING)
 
         def pushed(t: float) -> None:
             if abs(t - CARRIED) < CONTROL / 2:
@@ -269,23 +336,28 @@ def measure_carried(study: Study, case: str) -> Results:
         def told(t: float, posture: tuple[float, float, float]) -> Drive:
             return Drive(0.0, TURN) if localizer.wants_turn else driver(t, posture)
 
-        record = drive(body, CARRIED + RECOVERED, told, {"": localizer}, pushed)
-    events = [event for event in localizer.events if event.time > CARRIED]
-    noticed = next((e.time - CARRIED for e in events if e.status is not Status.TRACKING), math.inf)
-    found = [e.time - CARRIED for e in events if e.status is Status.TRACKING]
-    return Results(
-        room=room.name,
-        distance=carried[0],  # how far it was carried [m]
-        noticed=noticed,  # after so long [s]; inf if never
-        recovered=found[-1] if found else math.inf,  # and found again after so long [s]
-        off=float(record.tracks[""].place[-1]),  # at the end [m]
-    )
+        record = drive(body, CARRIED + RECOVERED, told, {"ours": localizer, "rival": sure}, pushed)
+
+    def came_of(one: Localizer, track: PostureErrors) -> Results:
+        events = [event for event in one.events if event.time > CARRIED]
+        noticed = next((e.time - CARRIED for e in events if e.status is not Status.TRACKING), math.inf)
+        found = [e.time - CARRIED for e in events if e.status is Status.TRACKING]
+        return Results(
+            room=room.name,
+            distance=carried[0],  # how far it was carried [m]
+            noticed=noticed,  # after so long [s]; inf if never
+            recovered=found[-1] if found else math.inf,  # and found again after so long [s]
+            off=float(track.place[-1]),  # at the end [m]
+        )
+
+    return Twice(came_of(localizer, record.tracks["ours"]), came_of(sure, record.tracks["rival"]))
 
 
-def conclude_carried(_study: Study, found: tuple[Results, ...]) -> Findings:
-    """Whether it noticed, and recovered."""
-    noticed = sum(one.noticed <= NOTICED for one in found)
-    recovered = sum(one.off <= NEAR for one in found)
+def conclude_carried(_study: Study, measured: tuple[Twice, ...]) -> Findings:
+    """Whether it noticed, and recovered, beside one without doubt."""
+    found, rivals = zip(*measured, strict=True)
+    noticed, unnoticed = (sum(one.noticed <= NOTICED for one in those) for those in (found, rivals))
+    recovered, lost = (sum(one.off <= NEAR for one in those) for those in (found, rivals))
     rows = [
         (
             ("apartment", one.room),
@@ -296,10 +368,9 @@ def conclude_carried(_study: Study, found: tuple[Results, ...]) -> Findings:
         )
         for one in found
     ]
+    without, total = "no test of the scans", len(found)
     claims = (
-        Claim(
-            f"of {len(found)} carried off, noticed within 3 s", OWN_BAR, len(found), noticed, noticed == len(found)
-        ),
-        Claim("and found again", OWN_BAR, len(found), recovered, recovered == len(found)),
+        all_of(f"of {total} carried off, noticed within 3 s", OWN_BAR, noticed, total, (without, unnoticed)),
+        all_of("and found again", OWN_BAR, recovered, total, (without, lost)),
     )
     return Findings(claims, (Table.of("carried", "robots that were carried off", rows),))

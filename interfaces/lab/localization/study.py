@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from interfaces.lab.output import write_runs
 from robots.bullet.rooms import Room, read_room
 from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
+from robots.onboard.localization import LocalizationConfig, Observability, Tracker, observability
 from robots.onboard.localizer import Localizer
 from vrs.checks import number_in
 from vrs.mobile import clipped
+from vrs.model import Array
 
 ALONG_LENGTH, SPEED = 20.0, 0.3
 """Of the drive [s], and its speed [m/s]."""
@@ -35,6 +38,8 @@ ALONG = math.radians(2)
 """The axis that is named lies so near the walls' direction [rad]."""
 PLACES = ("corridor", "single wall", "room")
 """The last is for comparison: nothing is unknown there."""
+UNKNOWN: Final = LocalizationConfig().unknown
+"""What counts as unobservable [m]."""
 
 
 def place(name: str) -> Room:
@@ -50,7 +55,7 @@ def place(name: str) -> Room:
 def measure_axis(study: Study, case: str) -> Results:
     """Drive along the walls."""
     chosen = setting(place(case), 1, 0.03, (study.seed, PLACES.index(case), 23))
-    said: list[tuple[bool, bool]] = []
+    said: list[tuple[bool, ...]] = []
     with body_of(chosen) as body:
         localizer = Localizer(plan_map(chosen.room), body.truth)
 
@@ -60,21 +65,50 @@ def measure_axis(study: Study, case: str) -> Results:
             if tracker.sights is None:
                 return
             unknown = tracker.observability.unobservable
-            named = len(unknown) == 1 and abs(math.asin(min(1.0, abs(unknown[0, 1])))) <= ALONG
-            said.append((named, len(unknown) == 0))
+            middles, single = middles_known(tracker), single_line(tracker)
+            said.append((_is_along(unknown), len(unknown) == 0, _is_along(middles.unobservable),
+                         len(single.unobservable) == 0))  # fmt: skip
 
         record = drive(body, ALONG_LENGTH, _swinging, {"": localizer}, look)
     track = record.tracks[""]
     last = track.covariances[-1]
-    named, none = np.mean(said, axis=0).tolist()
+    assert localizer.tracker is not None
+    doubt = np.linalg.inv(middles_known(localizer.tracker).information)
+    named, none, middles_named, single_none = np.mean(said, axis=0).tolist()
     return Results(
         place=case,
         named=named,  # share of the scans after which just the walls' direction was named as unobservable
         none=none,  # share after which nothing was
+        middles_named=middles_named,  # as `named`, with the lines' middles taken as known
+        single_none=single_none,  # as `none`, by one line of each scan
+        middles_ratio=math.sqrt(doubt[0, 0] / doubt[1, 1]),  # doubt along by that across, with middles as known
         along=math.sqrt(last[0, 0]),  # standard deviation along the walls at the end [m]
         across=math.sqrt(last[1, 1]),  # and across [m]
         inside=float(np.mean(track.normalised[20:] <= INSIDE)),  # share of normalised errors inside the 95 % bound
     )
+
+
+def middles_known(tracker: Tracker) -> Observability:
+    """What the last scan would say if a seen line's middle were that of the map's, as in eq. (4): along it, too."""
+    sights, lines = tracker.sights, tracker.filter.lines
+    assert sights is not None
+    x, y = (lines.poses[sights.of, :2] - tracker.posture[:2]).T
+    along = lines.directions[sights.of]
+    H = np.column_stack([along, along[:, 1] * x - along[:, 0] * y])
+    return observability(tracker.observability.information + (H.T / sights.lines.variances[:, 0]) @ H, UNKNOWN)
+
+
+def single_line(tracker: Tracker) -> Observability:
+    """What the first of its lines says by itself."""
+    sights = tracker.sights
+    assert sights is not None
+    H = tracker.filter.innovation(sights).H[:1, :, :3]
+    return observability(np.einsum("kai,ka,kaj->ij", H, 1 / sights.lines.variances[:1], H), UNKNOWN)
+
+
+def _is_along(unknown: Array) -> bool:
+    """Whether the walls' direction, and no other, is among unit vectors, (k, 2)."""
+    return len(unknown) == 1 and abs(math.asin(min(1.0, abs(unknown[0, 1])))) <= ALONG
 
 
 def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
@@ -85,16 +119,16 @@ def _swinging(t: float, posture: tuple[float, float, float]) -> Drive:
 
 def conclude_axes(_study: Study, found: tuple[Results, ...]) -> Findings:
     """Whether the axis is named, and the doubt along it honest."""
-    claims = []
+    claims, without = [], "middles of lines taken as known"
     for one in found:
         if one.place == "room":
             what = "room: scans after which nothing is called unobservable [%]"
-            claims.append(at_least(what, OWN_BAR, 95, 100 * one.none))
+            claims.append(at_least(what, OWN_BAR, 95, 100 * one.none, ("one line alone", 100 * one.single_none)))
             continue
         what = f"{one.place}: scans after which the way along is named as unobservable [%]"
-        claims.append(at_least(what, OWN_BAR, 95, 100 * one.named))
+        claims.append(at_least(what, OWN_BAR, 95, 100 * one.named, (without, 100 * one.middles_named)))
         what = f"{one.place}: doubt along the walls, times that across"
-        claims.append(at_least(what, OWN_BAR, 10, one.along / one.across))
+        claims.append(at_least(what, OWN_BAR, 10, one.along / one.across, (without, one.middles_ratio)))
     rows = [
         (
             ("place", one.place),

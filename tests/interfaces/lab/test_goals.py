@@ -20,6 +20,7 @@ from interfaces.lab.goals import study as goals_study
 from interfaces.lab.goals.scenes import FURNITURE, LATE, PHYSICS, ROUND, SHUT, Shortest, setting
 from interfaces.lab.goals.study import (
     EACH,
+    Measured,
     conclude_asked,
     conclude_physics,
     conclude_shut,
@@ -64,7 +65,8 @@ def test_settings_repeat_and_are_what_their_group_says() -> None:
 
 @pytest.mark.parametrize("group", [FURNITURE, PHYSICS])
 def test_a_goal_is_reached_and_nothing_is_touched(group: str) -> None:
-    found = measure(Study(11), f"{group}:2")
+    found, rivals, _ = measure(Study(11), f"{group}:2")
+    assert not rivals
     assert found.arrived, found.reason
     assert not found.touched
     assert 0.98 <= found.ratio <= 1.15
@@ -76,7 +78,7 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
     paper = Paper(
         "goals",
         "two trips",
-        (PaperPart("goals", measure, conclude_asked, (f"{FURNITURE}:0", f"{ROUND}:1")),),
+        (PaperPart("goals", measure, conclude_asked, (f"{FURNITURE}:1", f"{ROUND}:1")),),
     )
     written = []
     for workers in (1, 2):
@@ -90,7 +92,7 @@ def test_two_workers_write_what_one_writes(tmp_path: Path) -> None:
     assert rows[0] == ",".join(EACH)
     assert len(rows) == 3
     claims = json.loads(written[0]["summary.json"])["claims"]
-    assert claims[0]["measured"] == 2
+    assert claims[0]["measured"] == 100
 
 
 WHERE = TripSetting(Room("square", 6.0, 6.0), (1.0, 1.0, 0.0), Goal(5.0, 5.0, 0.0), (0, 1, 0))
@@ -98,8 +100,14 @@ ARRIVED = (JourneyState.ARRIVED, "", 5.2, 20.0, 1, 5.2, 0.01, 0.01, 0.02, (), np
 FAILED = {"state": JourneyState.FAILED, "problem": RouteProblem.NO_WAY}
 
 
-def found(group: str, *, mapped: float = 5.0, **changes: Any) -> Trip:
-    return replace(Trip(group, WHERE, mapped, mapped, *ARRIVED), **changes)
+LACKING = {"off": 1.0, "touched": (Collision(1.0, "chair"),)}
+"""What comes of a trip without what it takes."""
+
+
+def found(group: str, *, mapped: float = 5.0, **changes: Any) -> Measured:
+    trip = replace(Trip(group, WHERE, mapped, mapped, *ARRIVED), **changes)
+    lacking = replace(Trip(group, WHERE, mapped, mapped, *ARRIVED), **LACKING)
+    return Measured(trip, dict.fromkeys(goals_study.RIVALS[group], lacking), 1.3 * mapped)
 
 
 @pytest.fixture(name="without_maps")
@@ -114,7 +122,7 @@ def _without_maps(monkeypatch: pytest.MonkeyPatch) -> None:
         (FURNITURE, {"off": 0.051}, ["reached within"]),
         (FURNITURE, {"turned": math.radians(2.1)}, ["reached within"]),
         (FURNITURE, FAILED, ["reached within"]),
-        (FURNITURE, {"touched": (Collision(1.0, "chair"),)}, ["touched"]),
+        (FURNITURE, {"touched": (Collision(1.0, "chair"),)}, ["without a touch"]),
         (FURNITURE, {"planned": 5.8}, ["longer than"]),
         (FURNITURE, {"planned": math.nan}, ["longer than"]),
         (FURNITURE, {"mapped": math.inf}, ["longer than"]),
@@ -123,8 +131,8 @@ def _without_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_claims_on_goals_fail_where_a_trip_did(group: str, changes: dict[str, Any], said: list[str]) -> None:
-    good = [found(FURNITURE), found(ROUND), found(LATE)]
-    assert [claim.claim for claim in conclude_asked(Study(), tuple(good)).claims if not claim.met] == []
+    good = [found(FURNITURE), found(ROUND), found(LATE)] * 3
+    assert [claim.claim for claim in conclude_asked(Study(), tuple(good)).claims if not claim.holds] == []
     made = conclude_asked(Study(), (*good, found(group, **changes))).claims
     assert [any(word in claim.claim for word in said) for claim in made] == [not claim.met for claim in made]
 
@@ -141,8 +149,8 @@ def test_routes_that_are_mostly_too_long_or_unknown_are_said_so() -> None:
 
 @pytest.mark.usefixtures("without_maps")
 def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
-    def holds(conclude: Callable[..., Findings], *trips: Trip) -> list[bool]:
-        return [claim.met for claim in conclude(Study(), trips).claims]
+    def holds(conclude: Callable[..., Findings], *trips: Measured) -> list[bool]:
+        return [claim.holds for claim in conclude(Study(), trips).claims]
 
     shut = found(SHUT, **FAILED)
     assert holds(conclude_shut, shut) == [True]
@@ -151,6 +159,21 @@ def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
     assert holds(conclude_physics, found(PHYSICS)) == [True, True]
     assert holds(conclude_physics, found(PHYSICS), found(PHYSICS, **FAILED)) == [False, True]
     assert holds(conclude_physics, found(PHYSICS, touched=(Collision(1.0, "chair"),))) == [True, False]
+
+
+@pytest.mark.usefixtures("without_maps")
+def test_without_what_they_say_claims_on_goals_hold_no_more() -> None:
+    # A robot that waits takes long: the last one is made up.
+    trips = {group: measure(Study(5), f"{group}:0") for group in (FURNITURE, ROUND)} | {LATE: found(LATE)}
+    claims = conclude_asked(Study(), tuple(trips.values())).claims
+    assert [claim.claim for claim in claims if not claim.holds] == []
+    for group, one in trips.items():
+        for what, lacking in one.rivals.items():
+            off: dict[str, Measured] = trips | {group: one._replace(trip=lacking)}
+            planted = conclude_asked(Study(), tuple(off.values())).claims
+            said = [claim for claim in planted if what in claim.counterfactual.what]
+            assert said
+            assert not any(claim.holds for claim in said)
 
 
 def test_a_way_through_a_door_leads_through_it() -> None:

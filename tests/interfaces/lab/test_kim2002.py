@@ -13,8 +13,12 @@ from interfaces.lab import Study
 from interfaces.lab.claims import Claim, Figure, Results
 from interfaces.lab.kim2002 import PAPER, scenario
 from interfaces.lab.kim2002.scenario import (
+    CASTS,
+    HEEDLESS_ROBOT,
     ORDER,
+    OURS,
     PLEASE,
+    Measured,
     conclude,
     gap,
     play,
@@ -29,23 +33,54 @@ from robots.simulated import WORLDS
 from robots.vehicle import Cargo
 from vrs.errors import InvalidValueError
 
+SEED = int(np.random.SeedSequence([0, 1]).generate_state(1)[0])
 
-def test_the_scenario_is_played_to_its_end() -> None:
-    found = play(3)
+
+@pytest.fixture(name="played", scope="module")
+def _played() -> dict[str, Results]:
+    """The scenario as it is, and with each of the robots that lack something."""
+    return {who: play(SEED, who) for who in CASTS}
+
+
+def test_the_scenario_is_played_to_its_end(played: dict[str, Results]) -> None:
+    found = played[OURS]
     assert (found.stage, found.reason) == (JobStage.DONE, "")
     assert found.asked == ORDER
+    assert found.in_turn
     assert found.shown == PLEASE
     assert found.on_top
     assert found.slid < 0.005
     assert not found.touched
     assert 0.05 < found.passed < 1.5
     assert all(stop.off < 0.05 and stop.turned < math.radians(2) and stop.lost < 0.01 for stop in found.stops)
-    claims = conclude(Study(runs=2), ((found,), (found,), (), (), ())).claims
-    assert all(claim.met for claim in claims)
     home = place("home")
     a, b = home.place("A"), home.place("B")
     near = [min(math.dist(row[:2], (spot.x, spot.y)) for row in found.track.tolist()) for spot in (a, b)]
     assert max(near) < 0.05
+
+
+def test_who_walks_by_would_be_met_by_a_robot_that_ignores_him(played: dict[str, Results]) -> None:
+    (touch,) = played[HEEDLESS_ROBOT].touched
+    assert touch.thing == "passer-by"
+
+
+def measured(runs: list[Results], rivals: dict[str, Results]) -> tuple[Measured, ...]:
+    return tuple(
+        Measured(tuple(runs[k :: scenario.TOGETHER]), rivals[scenario.RIVALS[k]]) for k in range(scenario.TOGETHER)
+    )
+
+
+def test_what_is_claimed_holds_with_it_and_not_without(
+    played: dict[str, Results], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scenario, "picture", lambda _: Figure("", "", ""))
+    claims = conclude(Study(runs=2), measured([played[OURS]] * 2, played)).claims
+    assert [claim.claim for claim in claims if not claim.holds] == []
+    for who in scenario.WITHOUT:
+        planted = conclude(Study(runs=2), measured([played[who]] * 2, played)).claims
+        lacking = [claim for claim in planted if scenario.WITHOUT[who] in claim.counterfactual.what]
+        assert lacking
+        assert not any(claim.holds for claim in lacking)
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -77,7 +112,7 @@ def stop(off: float, turned: float, lost: float) -> Results:
 
 
 GOOD = Results(
-    stage=JobStage.DONE, reason="", asked=ORDER, shown=PLEASE, stops=(stop(0.01, 0.01, 0.001),) * 2,
+    stage=JobStage.DONE, reason="", asked=ORDER, in_turn=True, shown=PLEASE, stops=(stop(0.01, 0.01, 0.001),) * 2,
     slid=0.0, on_top=True, touched=(), passed=0.5, lost=0.01, time=60.0,
     track=np.zeros((2, 3)),
 )  # fmt: skip
@@ -85,8 +120,8 @@ GOOD = Results(
 
 def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Results) -> dict[str, Claim]:
     monkeypatch.setattr(scenario, "picture", lambda _: Figure("", "", ""))
-    measured = tuple(tuple(runs[k :: scenario.TOGETHER]) for k in range(scenario.TOGETHER))
-    return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), measured).claims}
+    found = measured(list(runs), dict.fromkeys(CASTS, GOOD))
+    return {claim.claim: claim for claim in conclude(Study(runs=len(runs)), found).claims}
 
 
 @pytest.mark.parametrize(
@@ -96,8 +131,8 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Results) -> dict[str, Clai
         ({"asked": ORDER[::-1]}, ["move, voice, message, move"]),
         ({"shown": ""}, ["until the key"]),
         ({"on_top": False}, ["on top at A"]),
-        ({"passed": 1.6}, ["passed near"]),
-        ({"touched": (Collision(50.0, "passer-by"),)}, ["touches"]),
+        ({"in_turn": False}, ["move, voice, message, move"]),
+        ({"touched": (Collision(50.0, "passer-by"),)}, ["nothing was touched"]),
         ({"stops": (stop(0.051, 0.0, 0.0), stop(0.0, 0.0, 0.0))}, ["position error at B"]),
         (
             {"stops": (stop(0.0, 0.0, 0.0), stop(0.051, 0.0, 0.0))},
@@ -108,7 +143,6 @@ def concluded(monkeypatch: pytest.MonkeyPatch, *runs: Results) -> dict[str, Clai
             ["heading error at A"],
         ),
         ({"stops": (stop(0.0, 0.0, 0.011), stop(0.0, 0.0, 0.0))}, ["localization at B"]),
-        ({"stops": (stop(0.0, 0.0, 0.0),)}, ["error at A", "localization at A", "on top at A"]),
     ],
 )
 def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
@@ -116,6 +150,7 @@ def test_one_run_of_six_that_goes_wrong_is_enough_to_fail(
 ) -> None:
     assert all(claim.met for claim in concluded(monkeypatch, *[GOOD] * 6).values())
     found = concluded(monkeypatch, *[GOOD] * 5, Results(**vars(GOOD) | changes))
+    assert not any(claim.holds for claim in found.values())
     assert [any(word in text for word in said) for text in found] == [not claim.met for claim in found.values()]
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from interfaces.lab.claims import Results, Study
+from interfaces.lab.claims import Claim, Results, Study, Verdict
 from interfaces.lab.kim2006 import PAPER, links, packets
-from interfaces.lab.kim2006.following import Followed, FollowingCase, course, path_leader, run
+from interfaces.lab.kim2006.following import RESEND, Followed, FollowingCase, course, path_leader, resend_after, run
 from interfaces.lab.kim2006.links import pair, verdict
 from interfaces.lab.kim2006.schemes import SCHEMES
+from interfaces.link.delays import delay_profile
 from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError
 
@@ -24,10 +26,6 @@ def test_the_first_experiments_packets_have_34_and_1992_bytes_and_save_what_the_
     assert len(sent.sizes) == 6000
     assert packets.saving(sent.sizes) == pytest.approx(38.65, abs=0.5)
     assert (sent.missing, sent.overflowed) == (0, 0)
-
-
-def test_sealed_ones_have_24_more() -> None:
-    assert set(packets.perform(2.0, 0.5, sealed=True).sizes) == {58, 2016}
 
 
 @pytest.mark.parametrize("duty", [0.0, 0.37, 1.0])
@@ -56,13 +54,13 @@ def test_every_scheme_follows_on_a_good_link(name: str) -> None:
 
 def test_rsp_is_smaller_than_packets_of_one_size_and_repeated_inputs() -> None:
     down = {name: run(FollowingCase(name, "none", 0.0, 1, 4.0, "bare")).down for name in SCHEMES}
-    assert down["rsp"] < down["repeated"] < down["fixed"] == down["tcp"]
+    assert down["rsp"] < down["repeated"] < down["fixed"] == down["tcp"] == down["padded"]
     assert down["fixed"] == pytest.approx(50 * 1992, rel=1e-3)
 
 
 def test_a_lost_packet_holds_up_tcp_and_loses_commands_without_acknowledgement() -> None:
-    found = {name: run(FollowingCase(name, "none", 0.1, 2, 8.0, "bare")) for name in SCHEMES}
-    assert found["tcp"].age > 2 * found["rsp"].age
+    found = {name: run(FollowingCase(name, "constant:0.1", 0.1, 2, 8.0, "bare")) for name in SCHEMES}
+    assert found["tcp"].age > 1.3 * found["rsp"].age
     assert found["fixed"].commands_missing > 0
     assert found["rsp"].commands_missing == 0
     assert found["rsp"].path_error < found["tcp"].path_error
@@ -98,11 +96,12 @@ def test_cases_are_checked(bad: dict) -> None:
 
 def test_a_network_is_measured_and_concluded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(links, "LOSSES", (0.1,))
-    found = links.work(SMALL, "none")
-    assert set(found[0].means) == set(SCHEMES)
+    found = links.work(Study(seed=1, runs=2, length=8.0), "constant:0.1")
+    assert set(found[0].means) == set(links.COMPARED)
     made = links.conclude(SMALL, (found,))
-    assert made.claims[0].met
-    assert len(made.tables[0].rows) == 4
+    (claim,) = made.claims
+    assert claim.holds
+    assert len(made.tables[0].rows) == 5
     assert {figure.name for figure in made.figures} == {"paths", "path_errors"}
 
 
@@ -127,13 +126,78 @@ def test_the_verdict_is_the_paired_intervals() -> None:
     assert pair([followed(0.1, 50)], [followed(0.2, 30)]) == ((pytest.approx(0.1),), (pytest.approx(0.2),))
 
 
-def test_a_claim_fails_where_tcp_is_nearer() -> None:
-    pairs = dict.fromkeys(("tcp", "fixed", "repeated"), ((0.02, 0.021), (0.01, 0.011)))
+NEAR, FAR = (0.01, 0.011), (0.02, 0.021)
+
+
+def network(pairs: tuple[tuple[float, ...], ...], streamed: tuple[tuple[float, ...], ...] = (FAR, FAR)) -> Results:
     mean = links.mean_of([followed(0.01, 1)])
-    worse = Results(delay="mon", loss=0.1, means=dict.fromkeys(SCHEMES, mean), pairs=pairs)
-    assert not links.wins_claim(worse).met
-    rows = links.wins_table([worse]).rows
-    assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1]
+    return Results(
+        delay="none", loss=0.0, means=dict.fromkeys(links.COMPARED, mean), streamed=streamed,
+        pairs=dict.fromkeys(links.COMPARED[1:], pairs),
+    )  # fmt: skip
+
+
+def test_rsp_is_nearer_than_tcp_if_its_packets_on_tcp_are_not() -> None:
+    assert links.nearer_claim(network((NEAR, FAR))).verdict is Verdict.HOLDS
+    assert links.nearer_claim(network((NEAR, FAR), (NEAR, FAR))).verdict is Verdict.NOT_SHOWN
+    for worse in ((FAR, NEAR), (FAR, FAR)):
+        assert links.nearer_claim(network(worse)).verdict is Verdict.FAILS
+    assert links.nearer_claim(network(((), ()))).verdict is Verdict.NOT_SHOWN
+    rows = links.wins_table([network((FAR, NEAR))]).rows
+    assert [row[2] for row in rows if row[1] == "path error"] == [1, 1, 1, 1]
+
+
+def test_rsp_is_equal_to_tcp_where_nothing_is_lost_if_it_is_not_where_something_is() -> None:
+    even, uneven = network((FAR, FAR)), network((NEAR, FAR))
+    assert links.equal_claim(even, uneven).verdict is Verdict.HOLDS
+    assert links.equal_claim(even, even).verdict is Verdict.NOT_SHOWN
+    assert links.equal_claim(uneven, even).verdict is Verdict.FAILS
+
+
+def test_a_ratio_is_of_geometric_means() -> None:
+    assert links.ratio(((0.01, 0.04), (0.02, 0.02))) == pytest.approx((1.0, 0.5, 2.0, None))
+    assert links.ratio(((), ())) is None
+
+
+def planted(claims: tuple[Claim, ...], lacking: tuple[Claim, ...]) -> None:
+    """All claims hold, and none of them where the mechanism is off."""
+    assert [claim.claim for claim in claims if not claim.holds] == []
+    assert [claim.claim for claim in lacking if claim.holds] == []
+
+
+def test_on_a_lossy_link_it_is_the_datagrams() -> None:
+    case = FollowingCase("rsp", "constant:0.1", 0.1, 1, 8.0, "bare")
+    runs = {name: [run(replace(case, scheme=name, seed=k)) for k in (1, 2)] for name in ("rsp", "tcp", "stream")}
+    streamed = pair(runs["stream"], runs["tcp"])
+    ours, off = (network(pair(runs[name], runs["tcp"]), streamed) for name in ("rsp", "stream"))
+    planted((links.nearer_claim(ours),), (links.nearer_claim(off),))
+
+
+def test_on_a_narrow_link_it_is_the_size() -> None:
+    small = Study(seed=0, runs=2, length=12.0)
+    found = {case: links.work_sizes(small, case) for case in ("256", "inf")}
+    off = {
+        case: Results(**vars(one) | {"pairs": one.pairs | {"rsp": one.pairs["padded"]}})
+        for case, one in found.items()
+    }
+    claims, lacking = (
+        links.conclude_sizes(
+            small, tuple(those["inf" if case == "inf" else "256"] for case in links.SIZE_CASES)
+        ).claims
+        for those in (found, off)
+    )
+    planted(claims, lacking)
+
+
+def test_packets_of_one_size_save_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packets, "LENGTH", 12.0)
+    found = packets.work(SMALL, "").claims
+    sizes = packets.perform_fixed(2.0)
+    fixed = Results(t=[0.02 * k for k in range(len(sizes))], sizes=sizes, missing=0, overflowed=0)
+    monkeypatch.setattr(packets, "perform", lambda *_: fixed)
+    for one, off in zip(found, packets.work(SMALL, "").claims, strict=True):
+        assert one.verdict is (Verdict.NOT_SHOWN if "fitted" in one.claim else Verdict.HOLDS)
+        assert off.verdict is not Verdict.HOLDS
 
 
 def test_narrow_links_are_concluded_by_the_ages() -> None:
@@ -141,11 +205,23 @@ def test_narrow_links_are_concluded_by_the_ages() -> None:
         return [(0.01, 0.02, 1.0, age + 0.001 * k, 0.1, 0.0, 1.0, 1.0) for k in range(3)]
 
     good = tuple((made(0.1), made(4.0 if case == "16" else 0.1)) for case in links.NARROW_CASES)
-    assert all(claim.met for claim in links.conclude_narrow(SMALL, good).claims)
-    bad = tuple((made(0.5), made(0.1)) for _ in links.NARROW_CASES)
+    off = tuple((fixed, fixed) for _, fixed in good)
+    planted(links.conclude_narrow(SMALL, good).claims, links.conclude_narrow(SMALL, off).claims)
+    bad = tuple((made(0.6), made(0.1)) for _ in links.NARROW_CASES)
     assert not any(claim.met for claim in links.conclude_narrow(SMALL, bad).claims)
+
+
+def test_tcp_sends_again_by_acknowledgements_where_the_round_trip_is_short() -> None:
+    assert resend_after(delay_profile("none")) == pytest.approx(0.06)
+    assert resend_after(delay_profile("constant:0.05")) == pytest.approx(0.16)
+    assert resend_after(delay_profile("mon")) == RESEND
 
 
 def test_the_paper_is_in_the_list() -> None:
     assert PAPER.name == "kim2006"
-    assert [part.title for part in PAPER.parts] == ["Variable packet size", "Path following", "Narrow links"]
+    assert [part.title for part in PAPER.parts] == [
+        "Variable packet size",
+        "Path following",
+        "Size alone",
+        "Narrow links",
+    ]

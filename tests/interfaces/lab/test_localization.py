@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,12 +15,22 @@ import pytest
 from typer.testing import CliRunner
 
 from interfaces.cli.main import app
-from interfaces.lab.claims import Study
+from interfaces.lab.claims import Findings, Results, Study
 from interfaces.lab.driving.run import run
 from interfaces.lab.driving.sweep import attributed
-from interfaces.lab.localization.accuracy import METHODS
-from interfaces.lab.localization.searching import distinctive, measure_carried, measure_symmetric, symmetric
-from interfaces.lab.localization.study import measure_axis
+from interfaces.lab.localization.accuracy import METHODS, RIVALS
+from interfaces.lab.localization.searching import (
+    Twice,
+    conclude_carried,
+    conclude_starts,
+    conclude_symmetric,
+    distinctive,
+    measure_carried,
+    measure_starts,
+    measure_symmetric,
+    symmetric,
+)
+from interfaces.lab.localization.study import conclude_axes, measure_axis
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from interfaces.runs.drive_run import DriveCase
 from robots.bullet.rooms import Room, read_room
@@ -127,10 +138,22 @@ def test_what_can_not_be_known_is_said(place: str) -> None:
         assert found.named > 0.95
         assert found.along > 5 * found.across
     assert found.inside > 0.7
+    assert all(claim.holds for claim in conclude_axes(Study(), (found,)).claims)
+    off = {"named": found.middles_named, "none": found.single_none, "along": found.middles_ratio, "across": 1.0}
+    lacking = conclude_axes(Study(), (Results(**vars(found) | off),)).claims
+    assert not any(claim.holds for claim in lacking)
+
+
+def hold_by_what_they_say(conclude: Callable[..., Findings], found: Twice) -> None:
+    """Claims hold, and don't where what they say is switched off."""
+    assert all(claim.holds for claim in conclude(Study(), (found,)).claims)
+    assert not any(claim.met for claim in conclude(Study(), (Twice(found.rival, found.rival),)).claims)
 
 
 def test_a_symmetric_room_is_ambiguous_and_all_places_are_named() -> None:
-    found = measure_symmetric(Study(3, 2, 2.0), "1")
+    measured = measure_symmetric(Study(3, 2, 2.0), "1")
+    hold_by_what_they_say(conclude_symmetric, measured)
+    found = measured.ours
     assert (found.status, found.named) == ("ambiguous", 2)
     assert found.off < 0.05
     assert symmetric(0).length == symmetric(0).width
@@ -162,8 +185,18 @@ def test_a_robot_that_was_told_nothing_finds_itself_after_a_turn_on_the_spot(see
         assert len(locate(other, surveyor.surroundings())) != 1
 
 
+def test_a_filter_that_begins_anywhere_does_not_find_its_place() -> None:
+    found = measure_starts(Study(2), "1:1")
+    assert found.answers == {"right": 1}
+    assert all(claim.holds for claim in conclude_starts(Study(), (found,)).claims)
+    off = found._replace(answers=found.guessed)
+    assert not any(claim.met for claim in conclude_starts(Study(), (off,)).claims)
+
+
 def test_a_robot_that_is_carried_off_notices_and_finds_itself_again() -> None:
-    found = measure_carried(Study(2, 2, 2.0), "1")
+    measured = measure_carried(Study(2, 2, 2.0), "1")
+    hold_by_what_they_say(conclude_carried, measured)
+    found = measured.ours
     assert found.noticed < 3.0
     assert found.recovered < 15.0
     assert found.off < 0.05
@@ -184,7 +217,7 @@ def test_the_study_gives_the_same_with_any_number_of_workers(tmp_path: Path) -> 
         "accuracy", "rooms", "unobservable", "starts", "symmetric", "carried",
     }  # fmt: skip
     rows = next(table["rows"] for table in summary["tables"] if table["name"] == "accuracy")
-    assert [row[0] for row in rows] == list(METHODS)
+    assert [row[0] for row in rows] == [*METHODS, *RIVALS.values()]
     assert len(made[0]["runs.csv"].splitlines()) == 3
 
 

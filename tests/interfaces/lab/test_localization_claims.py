@@ -16,12 +16,21 @@ from interfaces.lab.localization import searching
 from interfaces.lab.localization.accuracy import (
     AS_BUILT,
     BUILT,
+    BUILT_EXACT,
+    DRAWN_EXACT,
     METHODS,
+    NOISE_ALONE,
+    ODOMETRY,
+    PAPER,
     PLAN,
+    RIVALS,
     SLOW,
+    UNINJECTED,
     conclude_rooms,
 )
 from interfaces.lab.localization.searching import (
+    Starts,
+    Twice,
     conclude_carried,
     conclude_starts,
     conclude_symmetric,
@@ -46,9 +55,18 @@ def track(*, place: float = 1.0, turn: float = 1.0, doubt: float = 1.0, outlier:
 GOOD = track()
 
 
+BAD = track(place=100.0, turn=100.0)
+UNSURE = track(doubt=0.5)
+RIVALRY = {
+    ODOMETRY: track(place=50.0, turn=50.0), NOISE_ALONE: UNSURE, DRAWN_EXACT: UNSURE, BUILT_EXACT: UNSURE,
+    UNINJECTED: BAD,
+}  # fmt: skip
+"""What lacks something keeps no bar."""
+
+
 def room(name: str = "", bad: PostureErrors = GOOD) -> Results:
-    """A room in which everybody keeps the bars, but for one."""
-    tracks = dict.fromkeys(METHODS, GOOD) | ({name: bad} if name else {})
+    """A room in which everybody keeps the bars, but for one, and for those who lack something."""
+    tracks = dict.fromkeys(METHODS, GOOD) | RIVALRY | ({name: bad} if name else {})
     return Results(
         name="room", people=0, noise=0.01, way=10.0, collisions=0, lines=(4, 4), tracks=tracks, scene=None
     )
@@ -80,6 +98,16 @@ def test_claims_on_accuracy_fail_where_the_errors_are_too_large(
     assert all(any(word in claim for claim in found) for word in said)
 
 
+@pytest.mark.parametrize("name", [PLAN, AS_BUILT, BUILT, PAPER])
+def test_what_lacks_what_is_claimed_shows_nothing(name: str) -> None:
+    assert all(claim.holds for claim in conclude_rooms(Study(), (room(),)).claims)
+    for what in (RIVALS[name], ODOMETRY):
+        lacking = conclude_rooms(Study(), (room(name, RIVALRY[what]),)).claims
+        about = [claim for claim in lacking if claim.claim.startswith(name) and claim.counterfactual.what == what]
+        assert about or name == PAPER
+        assert not any(claim.holds for claim in about)
+
+
 def test_a_built_map_has_bars_of_its_own_and_a_slow_sweep_has_none() -> None:
     assert failed(conclude_rooms, [room(BUILT, track(place=2.2, turn=3.0))] * 3) == []
     found = failed(conclude_rooms, [room(BUILT, track(place=6.5, turn=6.5))] * 3)
@@ -106,8 +134,8 @@ def test_the_figures_are_in_the_units_that_the_claims_name() -> None:
     assert claims[f"{PLAN}: largest position error [cm]"] == pytest.approx(50.0, abs=1.0)
 
 
-def starts(**count: int) -> list[tuple[str, Counter[str]]]:
-    return [("room", Counter({answer: many})) for answer, many in count.items()]
+def starts(**count: int) -> list[Starts]:
+    return [Starts("room", Counter({answer: many}), Counter(wrong=1)) for answer, many in count.items()]
 
 
 def test_claims_on_starts_fail_where_too_few_are_found_or_too_many_wrong() -> None:
@@ -132,20 +160,28 @@ def twofold(status: Status = Status.AMBIGUOUS, named: int = 2, off: float = 0.05
     return Results(room="room", status=status, named=named, expected=2, off=off)
 
 
+def twice(*found: Results) -> list[Twice]:
+    """Without what is claimed they're as well."""
+    return [Twice(one, one) for one in found]
+
+
 def carried(noticed: float, off: float) -> Results:
     return Results(room="room", distance=2.0, noticed=noticed, recovered=6.0, off=off)
 
 
 def axis(place: str, *, named: float = 1.0, none: float = 0.0, along: float = 1.0) -> Results:
-    return Results(place=place, named=named, none=none, along=along, across=0.01, inside=0.95)
+    return Results(
+        place=place, named=named, none=none, along=along, across=0.01, inside=0.95, middles_named=0.0,
+        middles_ratio=1.0, single_none=0.0,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("bad", [
     twofold(Status.TRACKING), twofold(named=1), twofold(named=4), twofold(off=0.11), twofold(off=math.nan),
 ])  # fmt: skip
 def test_a_symmetric_room_that_is_taken_for_another_fails(bad: Results) -> None:
-    assert failed(conclude_symmetric, [twofold()] * 3) == []
-    assert len(failed(conclude_symmetric, [twofold(), bad])) == 1
+    assert failed(conclude_symmetric, twice(*[twofold()] * 3)) == []
+    assert len(failed(conclude_symmetric, twice(twofold(), bad))) == 1
 
 
 @pytest.mark.parametrize(("noticed", "off", "said"), [
@@ -153,8 +189,8 @@ def test_a_symmetric_room_that_is_taken_for_another_fails(bad: Results) -> None:
 ])  # fmt: skip
 def test_a_robot_that_never_finds_itself_again_fails(noticed: float, off: float, said: str) -> None:
     good = carried(1.0, 0.01)
-    assert failed(conclude_carried, [good] * 2) == []
-    (claim,) = failed(conclude_carried, [good, carried(noticed, off)])
+    assert failed(conclude_carried, twice(good, good)) == []
+    (claim,) = failed(conclude_carried, twice(good, carried(noticed, off)))
     assert said in claim
 
 
