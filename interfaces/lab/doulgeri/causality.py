@@ -9,6 +9,7 @@ import numpy as np
 
 from interfaces import Designer
 from interfaces.lab.claims import Claim, Counterfactual, Findings, Study, all_of
+from interfaces.lab.doulgeri.rivals import postponing
 from interfaces.lab.doulgeri.script import D_B, D_F, HOME, MODEL, ScriptedSite, script, target, twins
 from interfaces.link import Conditions, ConstantDelay
 from vrs import Engine, JointTarget, Lateness, ManualClock, MotionCommand, Status
@@ -69,7 +70,7 @@ def over_a_link(D: float, seed: int, length: float) -> tuple[dict[float, int], i
 def both_sites(D: float, seed: int, length: float) -> tuple[int, int, int]:
     """Commands postponed at the operator's site and at the robot's, and how many both accepted or postponed."""
     rng = np.random.default_rng(seed)
-    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, D)
+    lab = twins(Conditions(delay=ConstantDelay("constant", D_F)), rng, postponing(D))
     operator = lab.operator
     mine: dict[int, float] = {}
 

@@ -8,10 +8,11 @@ import numpy as np
 
 from interfaces.clients.ports import MemoryTransport, RemotePort
 from interfaces.engine_server.site import Site
+from interfaces.lab.doulgeri.rivals import RobotMaker, adaptive
 from interfaces.link import Channel, Conditions, ConstantDelay, LinkConditions, Service
 from interfaces.messages import Broadcast, Frame, Outcome, Reply
 from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
-from interfaces.teleop import FollowingArm, JointReference, OperatorSite, RobotSiteConfig, VirtualArm
+from interfaces.teleop import JointReference, OperatorSite, VirtualArm
 from robots import puma560
 from robots.onboard.playout import PlayState
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
@@ -97,8 +98,8 @@ def tool(q: Array) -> Array:
 class ScriptedSite:
     """A site and its clients, in virtual time; `now` is the users' [s]."""
 
-    def __init__(self, D: float, q: Array = HOME) -> None:
-        self.site = Site(Engine(MODEL, q=q, clock=ManualClock(D)), D=D)
+    def __init__(self, D: float, kind: type[Site] = Site) -> None:
+        self.site = kind(Engine(MODEL, q=HOME, clock=ManualClock(D)), D=D)
         self.engine = self.site.engine
         self.now = 0.0
         self._parts: list[VirtualPart] = [self.site]
@@ -138,23 +139,30 @@ class PortLog:
             self.outcomes.setdefault(message.number, message)
 
 
-def twins(way: Conditions, rng: np.random.Generator, D: float | None = None) -> Laboratory:
+def twins(way: Conditions, rng: np.random.Generator, robot: RobotMaker = adaptive) -> Laboratory:
     """Both sites of a robot at home, over a link that does the same each way.
 
     Args:
         way: What it does.
         rng: Source of everything random in it.
-        D: Fixed offset of the robot's clock [s]; None adapts.
+        robot: Makes the robot's site; ours adapts.
     """
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
-    return Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
+    return Laboratory(operator, robot(MODEL, HOME), LinkConditions.symmetric(way), rng)
 
 
-def limits_used(qd: Array, qdd: Array) -> float:
-    """Largest speed [rad/s] or acceleration [rad/s²] of rows of joints, as a share of its limit."""
-    limits = MODEL.limits
-    return float(max((np.abs(qd) / limits.qd_max).max(), (np.abs(qdd) / limits.qdd_max).max()))
+def limits_used(q: Array, step: float) -> float:
+    """Largest speed or acceleration of joints at even times, (k, n) [rad], as a share of its limit.
+
+    By differences, which means of it are: who plays by a law of its own can't say that it's otherwise.
+
+    Args:
+        q: Where they were.
+        step: Between two times [s].
+    """
+    limits, v = MODEL.limits, np.diff(q, axis=0) / step
+    a = np.diff(v, axis=0) / step
+    return float(max((np.abs(v) / limits.qd_max).max(initial=0.0), (np.abs(a) / limits.qdd_max).max(initial=0.0)))
 
 
 def played(lab: Laboratory) -> tuple[PlayState, JointReference]:

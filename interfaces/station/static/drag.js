@@ -1,10 +1,9 @@
 // Dragging the tool: a handle at the virtual tool; where it's dropped, the tool goes.
+import { DragLaw, GAIN } from "./dragging.js";
 import { html, useEffect, useRef } from "./ui.js";
 
 /** The handle is taken within so many pixels. */
 const REACH = 26;
-/** The nearer the tool is, the slower it goes: speed by distance [1/s]. */
-const GAIN = 3;
 /** So near it has arrived [m], and so long it may take after it was dropped [s]. */
 const THERE = 8e-4;
 const PATIENCE = 12;
@@ -24,6 +23,7 @@ function follow(station, handle, goal) {
   const THREE = window.MeshCat.THREE;
   /** Where the tool is to go, in the base frame [m]; null while nothing is dragged. */
   let target = null;
+  let law = null;
   let droppedAt = null;
   let plane = null;
   let offset = null;
@@ -54,18 +54,19 @@ function follow(station, handle, goal) {
     return ray.intersectPlane(plane, new THREE.Vector3());
   }
 
-  /** Towards the target, slower as it comes near. */
+  /** As the hand goes, and towards it; once it has let go, until the tool is there. */
   function input() {
     const here = tool();
     if (target === null || here === null) return null;
-    const way = target.map((x, k) => x - here[k]);
-    const distance = Math.hypot(...way);
-    const late = droppedAt !== null && performance.now() / 1000 - droppedAt > PATIENCE;
-    if (late || (droppedAt !== null && distance < THERE)) return null;
+    const now = performance.now() / 1000;
     const fastest = station.jog.share * station.config.robot.tool_speed;
-    const speed = Math.min(fastest, GAIN * distance);
-    const scale = distance > 1e-9 ? speed / distance : 0;
-    return { twist: [...way.map((x) => x * scale), 0, 0, 0], frame: "base" };
+    const speed = law.speed(now, target, here, fastest);
+    if (droppedAt !== null) {
+      const distance = Math.hypot(...target.map((x, k) => x - here[k]));
+      const there = distance < THERE && Math.hypot(...speed) < 2 * GAIN * THERE;
+      if (there || now - droppedAt > PATIENCE) return null;
+    }
+    return { twist: [...speed, 0, 0, 0], frame: "base" };
   }
 
   function end() {
@@ -91,6 +92,7 @@ function follow(station, handle, goal) {
     const met = pointed(event);
     offset = seen(here).sub(met);
     target = here;
+    law = new DragLaw();
     droppedAt = null;
     station.notices.use(handle);
     if (!steer.hold("drag", input, end)) return;
