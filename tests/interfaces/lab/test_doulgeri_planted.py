@@ -35,6 +35,7 @@ from interfaces.station.dragging import DragLaw
 from interfaces.teleop import following_arm
 from tests.interfaces.lab.test_doulgeri_claims import but
 from vrs import Engine, JointTarget, Profile, Timeline
+from vrs.commands import Retime
 from vrs.errors import PlanningError
 from vrs.insertion import insert, piece
 from vrs.scheduler import BaseScheduler, Scheduler
@@ -145,20 +146,20 @@ def wrong_offset(patch: Patch) -> None:
 
 def no_prediction(patch: Patch) -> None:
     """Frames are of the time at which they're made."""
-    patch.setattr(Broadcaster, "_lead", property(lambda _: 0.0, lambda *_: None), raising=False)
+    broadcast = Site.broadcast
+    patch.setattr(Site, "broadcast", lambda self, rate, **_: broadcast(self, rate))
 
 
 def stale_frames(patch: Patch) -> None:
     """Frames show where the robot was before."""
-    sample = Timeline.sample
-    make = Broadcaster._make
+    sample, advance = Timeline.sample, Broadcaster.advance
 
-    def planted(self: Broadcaster, now: float) -> Any:
+    def planted(self: Broadcaster, *, now: float) -> Any:
         with pytest.MonkeyPatch.context() as within:
             within.setattr(Timeline, "sample", lambda line, t, **how: sample(line, np.asarray(t) - 0.05, **how))
-            return make(self, now)
+            return advance(self, now=now)
 
-    patch.setattr(Broadcaster, "_make", planted)
+    patch.setattr(Broadcaster, "advance", planted)
 
 
 def one_loop(patch: Patch) -> None:
@@ -193,12 +194,7 @@ def as_rivals(patch: Patch) -> None:
 def feedback_alone(patch: Patch) -> None:
     """The law doesn't ask for the hand's speed."""
     speed = DragLaw.speed
-
-    def planted(self: DragLaw, *given: Any) -> Any:
-        self._t = None
-        return speed(self, *given)
-
-    patch.setattr(DragLaw, "speed", planted)
+    patch.setattr(DragLaw, "speed", lambda _, *given: speed(DragLaw(), *given))
 
 
 def queue(patch: Patch) -> None:
@@ -215,10 +211,14 @@ def slow_link(patch: Patch) -> None:
 def no_edits(patch: Patch) -> None:
     """The engine can't let a move begin at another time."""
 
-    def planted(*_: Any) -> Any:
-        raise PlanningError("moves stay as they are")
+    carry_out = Scheduler.carry_out
 
-    patch.setattr(Scheduler, "_retime", planted)
+    def planted(self: Scheduler, command: Any, now: float | None) -> Any:
+        if isinstance(command, Retime):
+            raise PlanningError("moves stay as they are")
+        return carry_out(self, command, now)
+
+    patch.setattr(Scheduler, "carry_out", planted)
 
 
 def no_seeking(patch: Patch) -> None:
@@ -230,11 +230,8 @@ def no_seeking(patch: Patch) -> None:
 def jump_to_live(patch: Patch) -> None:
     """Going live is a jump."""
 
-    def planted(self: PlayHead, *, now: float, wait: float = 0.0) -> float:
-        self._motion, self.mode = None, interactivity.Mode.LIVE
-        return now + wait
-
-    patch.setattr(PlayHead, "go_live", planted)
+    go_live = PlayHead.go_live
+    patch.setattr(PlayHead, "go_live", lambda self, *, now, wait=0.0: go_live(self, now=now - 60.0, wait=wait))
 
 
 def one_head(patch: Patch) -> None:
