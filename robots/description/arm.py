@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.description.description import MOST_JOINTS, Description, Joint, JointKind
-from robots.description.geometry import Geometry, followed, geometry
+from robots.description.geometry import Geometry, geometry
 from robots.description.inverse import Inverse
-from robots.description.rigid import at_rest, motion
-from robots.solids import LinkShape
+from robots.description.rigid import at_rest
 from vrs.checks import finite_array
 from vrs.errors import InvalidValueError
 from vrs.model import Array, Limits, frozen_array
@@ -155,30 +154,6 @@ class DescribedArm:
     def configuration(self, _q: ArrayLike) -> str:
         """Empty: it has no names of configurations."""
         return ""
-
-    @property
-    def shapes(self) -> tuple[LinkShape, ...]:
-        """What all links look like, those beside the arm's chain too."""
-        return tuple(shape for link in self.description.links.values() for shape in link.shapes)
-
-    def placed(self, q: ArrayLike) -> Array:
-        """Return the poses of `shapes` in the base frame, (m, 4, 4), at q, (n,).
-
-        Joints that follow others do so; those beside the chain stand where they rest, at 0 or the nearest limit.
-
-        Raises:
-            InvalidValueError: If q has another shape, or holds NaN or infinity.
-        """
-        values = dict(zip(self.joints, self._row(q).tolist(), strict=True))
-        X = {self.description.root: np.eye(4)}
-        named = {joint.name: joint for joint in self.description.joints}
-        for joint in self.description.joints:
-            source, gain, offset = followed(self.description, joint)
-            value = values.get(source)
-            value = at_rest(named[source]) if value is None else value
-            X[joint.child] = X[joint.parent] @ joint.X @ motion(joint, gain * value + offset)
-        poses = [X[name] for name, link in self.description.links.items() for _ in link.shapes]
-        return np.array(poses).reshape(-1, 4, 4)
 
     def _checked(self, q: ArrayLike) -> Array:
         n = self.limits.dof

@@ -11,6 +11,7 @@ from robots.description.description import Description, Joint, JointKind, corner
 from robots.description.numbers import BaseNumbers
 from robots.description.rigid import carried
 from robots.solids import LinkShape
+from vrs.errors import InvalidValueError
 from vrs.model import Array
 
 _LEVEL: Final = 0.2
@@ -63,9 +64,13 @@ def wheeled(description: Description, stated: BaseNumbers) -> WheeledBase | None
     Args:
         description: What the robot is.
         stated: What's stated of it; that counts more than what is measured.
+
+    Raises:
+        InvalidValueError: If wheels are steered.
     """
     poses = placed(description)
-    wheels = _wheels(description, poses)
+    every = _wheels(description, poses)
+    wheels = [wheel for wheel in every if not any(above.moves for above in description.chain(wheel.joint.parent))]
     turned = {wheel.joint.name for wheel in wheels}
     others = max(
         (
@@ -82,6 +87,15 @@ def wheeled(description: Description, stated: BaseNumbers) -> WheeledBase | None
     pairs = [(one, other) for one in left for other in right if _is_pair(one, other)]
     if not pairs:
         return None
+    steering = [
+        f"{above.name} steers {wheel.joint.name}"
+        for wheel in every
+        for above in description.chain(wheel.joint.parent)
+        if _steers(above, poses) and wheel.lowest - floor < _NEAR * wheel.radius
+    ]
+    if steering:
+        allowed = f"driven by its two sides, without steered wheels; {', '.join(steering)}"
+        raise InvalidValueError("robot", description.name, allowed)
     return _based(description, poses, pairs, floor, stated)
 
 
@@ -89,10 +103,9 @@ def _wheels(description: Description, poses: dict[str, Array]) -> list[_Wheel]:
     found = []
     for joint in description.joints:
         endless = joint.kind is JointKind.CONTINUOUS or (joint.kind is JointKind.REVOLUTE and joint.q_min is None)
-        steered = any(above.moves for above in description.chain(joint.parent))
         X = poses[joint.child]
         axis = X[:3, :3] @ joint.axis
-        if not endless or steered or joint.mimic is not None or abs(axis[2]) > _LEVEL:
+        if not endless or joint.mimic is not None or abs(axis[2]) > _LEVEL:
             continue
         link = description.links[joint.child]
         corners = corners_of(link.shapes or link.collisions)
@@ -103,6 +116,12 @@ def _wheels(description: Description, poses: dict[str, Array]) -> list[_Wheel]:
         centre = X[:3, :3] @ (joint.axis * 0.5 * (along.min() + along.max())) + X[:3, 3]
         found.append(_Wheel(joint, centre, axis, radius, float(np.ptp(along))))
     return found
+
+
+def _steers(joint: Joint, poses: dict[str, Array]) -> bool:
+    """Whether a joint turns what hangs on it about a vertical axis, within limits; a caster has none."""
+    upright = abs(float((poses[joint.child][:3, :3] @ joint.axis)[2])) > 1 - _LEVEL
+    return joint.kind is JointKind.REVOLUTE and joint.q_min is not None and upright
 
 
 def _across(wheels: list[_Wheel]) -> Array:

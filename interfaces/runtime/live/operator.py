@@ -42,7 +42,7 @@ from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
 from vrs.clock import Clock, WallClock, seconds_since_1970
-from vrs.errors import VrsError
+from vrs.errors import UnreachablePoseError, VrsError
 from vrs.model import Array
 
 SHOW = 1.0 / 60.0
@@ -110,6 +110,11 @@ class LiveOperator(LeasedRobot, Workers):
             twins = ArmTwins(
                 which, config.conditions, config.seed, q=config.q, config=config.site, rates=config.rates
             )
+        if not which.is_base:
+            # What a model loads when it's first asked, nobody waits for.
+            q = which.arm.poses["nominal"]
+            with contextlib.suppress(UnreachablePoseError):
+                which.arm.inverse_near(which.arm.forward(q), q)
         self.clock = WallClock() if clock is None else clock
         self.twins, self.operator, self.line, self.scene = twins, twins.operator, twins.line, twins.scene
         self._turning = Turning(self.clock, self._turn)

@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 from robots.description.arm import arm_model
 from robots.description.description import JointKind, Mimic
 from robots.description.geometry import compiled, geometry
-from robots.solids import LinkShape
 from tests.robots.description.described import C, P, R, arm, described, file, joined, shifted
 from vrs.errors import InvalidValueError
 from vrs.model import RobotModel
@@ -128,31 +127,6 @@ def test_any_chain_moves_as_the_exponentials_of_its_twists_say(made):
     assert (model.forward(rows)[0] == model.forward(q)).all()
     assert (model.jacobian(rows)[0] == J).all()
     assert (model.links(rows)[0] == links).all()
-
-
-def test_shapes_on_fixed_and_following_joints_go_along():
-    cube = LinkShape("cube", np.eye(3), np.array([[0, 1, 2]]), np.ones(3), np.ones((1, 3)))
-    joints = (
-        joined("turn", R, "base", "post", shifted((0, 0, 1)), (0, 0, 1)),
-        joined("screws", JointKind.FIXED, "post", "hand", shifted((1, 0, 0)), (0, 0, 1)),
-        joined("left", P, "hand", "thumb", np.eye(4), (0, 1, 0), mimic=Mimic("turn", 0.1, 0.02)),
-        joined("right", P, "hand", "finger", np.eye(4), (0, -1, 0), (0.03, 0.1)),
-        joined("nod", R, "base", "head", shifted((0, 0, 2)), (0, 1, 0), mimic=Mimic("turn", -1.0)),
-    )
-    plain = described("hand", joints, ("base", "post", "hand", "thumb", "finger", "head"))
-    links = {
-        name: replace(link, shapes=(cube,) * (2 if name == "hand" else 1)) for name, link in plain.links.items()
-    }
-    model = arm_model(replace(plain, links=links), "hand")
-    assert len(model.shapes) == 7
-    base, post, hand, again, thumb, finger, head = model.placed([0.5])
-    assert (base == np.eye(4)).all()
-    assert (hand == again).all()
-    assert np.allclose(post, model.links([0.5])[0] @ shifted((0, 0, 1), (0, 0, 0.5)))
-    assert np.allclose(hand, model.forward([0.5]))
-    assert np.allclose(thumb, hand @ shifted((0, 0.07, 0)))
-    assert np.allclose(finger, hand @ shifted((0, -0.03, 0)))
-    assert np.allclose(head, shifted((0, 0, 2), (0, -0.5, 0)))
 
 
 def test_what_an_arm_follows_is_said():

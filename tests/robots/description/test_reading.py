@@ -508,3 +508,10 @@ def test_every_robot_that_is_read_says_itself_what_finds_it(
     robot = load("robots/my robot.urdf")
     monkeypatch.chdir(tmp_path)
     assert load(robot.found_by).name == robot.name
+
+
+def test_steered_wheels_are_refused() -> None:
+    with pytest.raises(
+        InvalidValueError, match=r"without steered wheels; left_steering_hinge_joint steers left_front"
+    ):
+        described(str(bullet_data("racecar/racecar.urdf")))
