@@ -104,9 +104,9 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
 
 
 def ratio(pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> Estimate | None:
-    """One scheme's path error by another's, the geometric mean over seeds; None where no seed has both."""
+    """One scheme's path error by another's, the geometric mean over seeds; None where fewer than two have both."""
     one, other = pairs
-    if not one:
+    if len(one) < 2:
         return None
     found = bootstrap(np.log(one) - np.log(other), 0)
     return Estimate(math.exp(found.value), math.exp(found.low), math.exp(found.high), found.level)
@@ -119,10 +119,10 @@ def compared(
     without: tuple[tuple[float, ...], tuple[float, ...]],
     text: str,
 ) -> Claim:
-    """A claim on the ratio of path errors; it isn't shown where a robot that is to be compared never moved."""
+    """A claim on the ratio of path errors; it isn't shown where robots that are to be compared never moved."""
     measured, other = ratio(pairs), ratio(without)
     if measured is None:
-        return Claim(text, SOURCE, f"≤ {1 - EQUAL:g}", "the other's robot never moved", met=True)
+        return Claim(text, SOURCE, f"≤ {1 - EQUAL:g}", "the other's robots never moved", met=True)
     return claim(measured, None if other is None else (what, other))
 
 
@@ -311,8 +311,9 @@ def conclude_sizes(_study: Study, results: tuple[Results, ...]) -> Findings:
         nearer, one = partial(at_most, text, SOURCE, 1 - EQUAL), found[case]
         claims.append(compared(nearer, one.pairs["rsp"], "RSP's packets filled up", one.pairs["padded"], text))
     text = "bandwidth enough, with music: path error of RSP by that of fixed packets, both on UDP: equal"
-    equal, other = partial(between, text, OWN_BAR, 1 - EQUAL, 1 + EQUAL), found[narrow[-1]]
-    claims.append(compared(equal, found[wide].pairs["rsp"], f"{narrow[-1]} kbit/s", other.pairs["rsp"], text))
+    equal, beside = partial(between, text, OWN_BAR, 1 - EQUAL, 1 + EQUAL), "256"
+    pairs = found[wide].pairs["rsp"], found[beside].pairs["rsp"]
+    claims.append(compared(equal, pairs[0], _link(beside), pairs[1], text))
     rows: list[list[tuple[str, Cell]]] = [
         [
             ("link", _link(case)),
