@@ -14,6 +14,7 @@ from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
 from interfaces.teleop import FollowingArm, JointReference, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
 from robots.onboard.playout import PlayState
+from robots.robot import ArmBody
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
 from vrs.commands import Command
 from vrs.model import Array
@@ -138,17 +139,20 @@ class PortLog:
             self.outcomes.setdefault(message.number, message)
 
 
-def twins(way: Conditions, rng: np.random.Generator, D: float | None = None) -> Laboratory:
+def twins(
+    way: Conditions, rng: np.random.Generator, D: float | None = None, body: ArmBody | None = None
+) -> Laboratory:
     """Both sites of a robot at home, over a link that does the same each way.
 
     Args:
         way: What it does.
         rng: Source of everything random in it.
         D: Fixed offset of the robot's clock [s]; None adapts.
+        body: What follows; without one nothing is measured.
     """
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
     robot = FollowingArm(MODEL, HOME, now=0.0, config=RobotSiteConfig(fixed_offset=D))
-    return Laboratory(operator, robot, LinkConditions.symmetric(way), rng)
+    return Laboratory(operator, robot, LinkConditions.symmetric(way), rng, body=body)
 
 
 def limits_used(qd: Array, qdd: Array) -> float:
