@@ -6,13 +6,18 @@ DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test without contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
 
 test: $(DEV_STAMP) lint types
 	$(PY) -m pytest -n 3 --durations=5
+
+# The same as if PyBullet, and as if MuJoCo, weren't installed.
+without: $(DEV_STAMP)
+	VRS_WITHOUT=pybullet,pybullet_data $(PY) -m pytest -n 3 -rs
+	VRS_WITHOUT=mujoco $(PY) -m pytest -n 3 -rs
 
 # What must not change, through doors alone: commands, sockets, files, public packages; the slow papers, too.
 contract: $(DEV_STAMP)

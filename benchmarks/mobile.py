@@ -17,6 +17,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from benchmarks.timing import seconds
+from robots.bullet.vehicle import BulletVehicle
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Senses, SonarModel
@@ -39,7 +40,8 @@ def circle(body: MobileRobot) -> None:
 
 def bare_steps(body: MobileBody, count: int) -> None:
     """Step a robot's world without anything around it."""
-    step = body.world.bullet.stepSimulation
+    assert isinstance(body.vehicle, BulletVehicle)
+    step = body.vehicle.world.bullet.stepSimulation
     for _ in range(count):
         step()
 
@@ -50,13 +52,15 @@ def measure(blocks: int = 40) -> dict[str, float]:
     blind = Senses(sonar=None, camera=None)
     found: dict[str, list[float]] = {}
     with (
-        MobileBody(IPR, START, room="furnished", rng=1) as simulated,
-        MobileBody(MICRO, START, room="furnished", rng=1) as micro,
-        MobileBody(IPR, START, room="furnished", rng=1) as stepped,
+        MobileBody(IPR, START, room="furnished", rng=1, world="bullet") as simulated,
+        MobileBody(MICRO, START, room="furnished", rng=1, world="bullet") as micro,
+        MobileBody(IPR, START, room="furnished", rng=1, world="mujoco") as mujoco,
+        MobileBody(IPR, START, room="furnished", rng=1, world="bullet") as stepped,
     ):
         bodies: dict[str, MobileRobot] = {
             "simulated": simulated,
             "micro": micro,
+            "mujoco": mujoco,
             "bare": BareBody(IPR, START, room="furnished", rng=1, senses=blind),
             "bare_sonar": BareBody(IPR, START, room="furnished", rng=1, senses=sonar),
         }
@@ -195,6 +199,7 @@ def part() -> Part:
         (
             row("IPR in PyBullet, sonars and camera", "simulated", 20.0, share),
             row("micro-robot in PyBullet, sonars and camera", "micro", 20.0),
+            row("IPR in MuJoCo, sonars and camera", "mujoco", 10.0),
             row("bare robot", "bare", 500.0),
             row("bare robot with sonars", "bare_sonar", None),
             *(row(f"a run by {name}, bare, with link and metrics", name, 250.0) for name in ARCHITECTURES),

@@ -50,9 +50,11 @@ const [page] = performance.getEntriesByType("navigation");
 const painted = performance.getEntriesByName("first-contentful-paint")[0];
 return [painted.startTime / 1e3, Math.max(...parts.map((one) => one.responseEnd)) / 1e3,
     parts.reduce((sum, one) => sum + one.transferSize, page.transferSize), parts.length + 1]; }"""
-_TASKS = """() => { window.held = []; new PerformanceObserver((list) => { for (const entry of list.getEntries())
-for (const { duration, sourceURL, invoker } of entry.scripts) held.push([duration, sourceURL, invoker]);
-}).observe({ type: 'long-animation-frame', buffered: true }); }"""
+_TRACED = "toplevel", "devtools.timeline"
+_TASK, _CALL = "ThreadControllerImpl::RunTask", "FunctionCall"
+_LONG = 50.0
+"""A task that's longer holds people up [ms]."""
+_SHOWN = 12
 
 
 def holds(page: Any, expression: str) -> None:
@@ -266,16 +268,35 @@ def use(page: Any, seconds: float) -> None:
 
 
 def tasks() -> None:
-    """How long scripts hold up the page's thread while it's used, by whose they are."""
+    """How long tasks hold up the page's thread while it's used, in the processor's own time, by whose they are.
+
+    By the clock they take what other programs leave them of the processor; and what draws waits for the picture,
+    where no graphics card makes it.
+    """
     with served(*HOLD) as (port, _), browser_page(f"http://127.0.0.1:{port}/") as page:
-        page.evaluate(_TASKS)
+        browser = page.context.browser
+        browser.start_tracing(page=page, categories=list(_TRACED))
         use(page, 60.0)
-        held: dict[str, list[float]] = {}
-        for took, source, invoker in page.evaluate("held"):
-            held.setdefault(f"{source.split('/', 3)[-1] or '(none)'} {invoker[:40]}", []).append(took)
-    print(f"scripts in slow frames of a minute; load {os.getloadavg()[0]:.1f}")
-    for name, times in sorted(held.items(), key=lambda item: -max(item[1])):
-        print(f"    longest {max(times):5.0f} ms, {len(times):4d} times, {name}")
+        events = json.loads(browser.stop_tracing())["traceEvents"]
+    renderers = {
+        (one["pid"], one["tid"])
+        for one in events
+        if one["name"] == "thread_name" and one["args"]["name"] == "CrRendererMain"
+    }
+    took = [one for one in events if one.get("tdur") and (one["pid"], one["tid"]) in renderers]
+    whole = np.array([[one["tdur"], one["dur"]] for one in took if one["name"] == _TASK]) / 1e3
+    long = np.count_nonzero(whole > _LONG, axis=0)
+    print(f"tasks of a minute of use; load {os.getloadavg()[0]:.1f}")
+    print(f"    longest {whole[:, 0].max():.0f} ms of the processor's time, {long[0]} over {_LONG:.0f} ms")
+    print(f"    by the clock {whole[:, 1].max():.0f} ms, {long[1]} over {_LONG:.0f} ms")
+    calls: dict[str, list[float]] = {}
+    for one in took:
+        if one["name"] == _CALL:
+            data = one["args"]["data"]
+            where = f"{data.get('functionName')} {data.get('url', '').split('/', 3)[-1]}:{data.get('lineNumber')}"
+            calls.setdefault(where, []).append(one["tdur"] / 1e3)
+    for name, times in sorted(calls.items(), key=lambda item: -max(item[1]))[:_SHOWN]:
+        print(f"    longest {max(times):5.1f} ms, {len(times):5d} times, {sum(times):6.0f} ms in all, {name}")
 
 
 def memory() -> None:

@@ -17,6 +17,7 @@ def connect(
     name: str = "client",
     encoding: str = "vrs.1.msgpack",
     timeout: float = 5.0,
+    alters: bool = False,
 ) -> Connection:
     """Reach a robot that `vrs serve` serves.
 
@@ -27,6 +28,8 @@ def connect(
         name: For people, 1 to 100 characters.
         encoding: How messages are written, `vrs.1.msgpack` or `vrs.1.json`.
         timeout: How long to wait for the first answer [s].
+        alters: Whether others may correct the path of what it commands while it has the lease: what they ask is to
+            be taken by `take_corrections`, and answered.
 
     Raises:
         UnreachableError: If there's no answer, or the server refuses; it's a ConnectionError.
@@ -37,7 +40,9 @@ def connect(
     from interfaces.stream.codec import Encoding
     from interfaces.stream.connection import Connection
 
-    client = partial(ClientCore, expects=Welcome, name=name, token=token, encoding=Encoding(encoding))
+    client = partial(
+        ClientCore, expects=Welcome, name=name, token=token, encoding=Encoding(encoding), alters=alters
+    )
     return Connection(url, client, role=Role(role), timeout=timeout)
 
 

@@ -343,8 +343,12 @@ class Robot:
 
     @property
     def usual_body(self) -> str:
-        """Name of the body that an arm has unless another is asked for."""
+        """Name of the body that it has unless another is asked for."""
         return next(iter(self.bodies), IDEAL)
+
+    def has_body(self, name: str) -> bool:
+        """Whether it has a body of a name: see `body_name`."""
+        return name in self.bodies or (not self.is_base and (name in {IDEAL, EXACT} or is_driver(name)))
 
     def body_name(self, name: str = "") -> str:
         """Name of a body that it has.
@@ -368,9 +372,9 @@ class Robot:
         Raises:
             InvalidValueError: If it has no such body, or it's hardware, which follows no virtual time.
         """
-        if is_driver(name):
-            raise InvalidValueError("body", name, "a simulated one: hardware runs live, in serve and robot")
         chosen = self.body_name(name)
+        if is_driver(chosen):
+            raise InvalidValueError("body", name, "a simulated one: hardware runs live, in serve and robot")
         return replace(self, bodies={chosen: self.body(chosen), **self.bodies})
 
     def body(self, name: str = "") -> Callable[..., Any]:

@@ -12,19 +12,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from operator import truediv
-from typing import Annotated, Final, Protocol
+from typing import Annotated, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from robots.bullet.chain import BulletChain
+from robots.bullet.vehicle import BulletVehicle
 from robots.bullet.world import LostError, WorldClosedError
 from robots.chain import Chain, Inertia
 from robots.drives import Drives
 from robots.mujoco.chain import MujocoChain
+from robots.mujoco.vehicle import MujocoVehicle
 from robots.onboard.servo import FeedForward, Servo, ServoGains
 from robots.robot import Closing, Measured, Prepared
+from robots.vehicle import RigidVehicle
 from vrs.checks import finite, finite_array, number_in, validated, within
 from vrs.errors import InvalidValueError
 from vrs.model import Array, Limits, frozen_array
@@ -123,8 +126,17 @@ class RigidChain(Protocol):
         """Give back what it holds."""
 
 
-WORLDS: Final[dict[str, Callable[..., RigidChain]]] = {"bullet": BulletChain, "mujoco": MujocoChain}
-"""Makers of chains, by the names of bodies; the usual one first, PyBullet where it's installed."""
+class Makers(NamedTuple):
+    """What a world of physics makes of what a robot consists of."""
+
+    chain: Callable[..., RigidChain]
+    """Of a `Chain`."""
+    vehicle: Callable[..., RigidVehicle]
+    """Of a `robots.vehicle.Vehicle` in a room."""
+
+
+WORLDS: Final = {"bullet": Makers(BulletChain, BulletVehicle), "mujoco": Makers(MujocoChain, MujocoVehicle)}
+"""Worlds of physics by the names of bodies; the usual one first, PyBullet where it's installed."""
 if find_spec("pybullet") is None:
     WORLDS["bullet"] = WORLDS.pop("bullet")
 _BOUNDS: Final = (1e3, 1e3, 1e5)
@@ -164,7 +176,7 @@ class SimulatedArm(Closing):
         """
         self.reality = reality = Reality() if reality is None else reality
         gains = ServoGains() if gains is None else gains
-        self._world, self._n, links = WORLDS[world], len(chain.links), chain.links
+        self._world, self._n, links = WORLDS[world].chain, len(chain.links), chain.links
         if not reality.rotor_inertia:
             links = tuple(replace(link, armature=0.0) for link in links)
         self._chain = replace(chain, links=links)

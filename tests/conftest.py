@@ -1,13 +1,27 @@
-"""How tests are shared out to processes."""
+"""How tests are shared out to processes, and what runs where a world of physics isn't installed.
+
+`VRS_WITHOUT=pybullet,pybullet_data` or `VRS_WITHOUT=mujoco` hides those modules from tests and from the processes
+that they start. A test that fails because of one of them is skipped, and says which; everything else runs with what
+is there.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import runpy
+from collections.abc import Generator, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+WITHOUT = Path(__file__).parent / "without"
+HIDDEN = frozenset(os.environ.get("VRS_WITHOUT", "").split(",")) - {""}
+if HIDDEN and str(WITHOUT) not in os.environ.get("PYTHONPATH", "").split(os.pathsep):
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(WITHOUT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    runpy.run_path(str(WITHOUT / "sitecustomize.py"))
 
 BROWSER = re.compile(r"\b(browser|new_page)\b")
 
@@ -32,3 +46,36 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return "browser" if _has_browser(str(config.rootpath / file)) else file
 
     return ByFile(config, log)
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """An error, and those that it was raised from or amid."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
+
+
+def _skipped(report: Any, call: Any) -> None:
+    """Let a failure for want of a hidden module count as skipped."""
+    if HIDDEN and report.outcome == "failed" and call.excinfo is not None:
+        for error in _chain(call.excinfo.value):
+            if isinstance(error, ModuleNotFoundError) and error.name in HIDDEN:
+                report.outcome = "skipped"
+                report.longrepr = (report.nodeid.split("::", 1)[0], 0, f"Skipped: needs {error.name}")
+                return
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, Any]:
+    """Skip files that need a hidden module."""
+    report = yield
+    _skipped(report, report.call)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
+    """Skip tests that need a hidden module."""
+    report = yield
+    _skipped(report, call)
+    return report

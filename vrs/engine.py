@@ -25,6 +25,7 @@ from vrs.commands import (
     DriveCommand,
     InsertVia,
     Lateness,
+    MotionCommand,
     ParameterChange,
     Position,
     PositionQuery,
@@ -162,6 +163,10 @@ class Engine:
             UnknownCommandError: If this engine gave no receipt of that id.
         """
         return self.scheduler.ledger.receipt(command_id)
+
+    def command(self, command_id: int) -> MotionCommand | None:
+        """The motion command of an id; None where it was something else or isn't known."""
+        return self.scheduler.ledger.command(command_id)
 
     def notes(self, command_id: int) -> Notes:
         """What the reason of a command's receipt is the text of; empty where it was rejected or isn't known."""

@@ -18,6 +18,7 @@ class NoteCode(Enum):
     REPLANNED = "goes from elsewhere, as command {} was cancelled"
     LEADS_ON = "the arm still goes to where command {} begins"
     BY_A_VIA = "goes by a via"
+    """Its values are the deviation [m], and the joints of the via [rad]."""
     AT_A_PACE = "{:g} times as fast"
     STOOD = "stood"
     STOPPED_ON_WAY = "stopped on its way"

@@ -75,6 +75,7 @@ from vrs.pacing import as_plan, composed, halting, paced, remainder, segment_at,
 from vrs.planning import Plan, altering, rounding, steering
 from vrs.planning.certificate import violation
 from vrs.planning.jerk_limited import is_prompt_stop, stop, straight_stop
+from vrs.planning.path import tooled
 from vrs.planning.plan import end_position, end_state
 from vrs.segment import HOLD, Piece, State, shifted
 from vrs.timeline import BaseTimeline, Timeline
@@ -870,14 +871,15 @@ class Scheduler(BaseScheduler[Timeline]):
                 second, _, second_notes = self.planner(motion, limits)(rest)
                 return first, second, first_notes + second_notes
 
-            way = rounding.rounded(plans, command.deviation, self.model, self.limits, motion.profile)
-            return way.whole, frozen_array(receipt.q if receipt.q is not None else via), way.notes
+            seen = tooled(self.model, motion.tool)
+            way = rounding.rounded(plans, command.deviation, seen, self.limits, motion.profile)
+            led = Note(NoteCode.BY_A_VIA, (command.deviation, *via.tolist()))
+            return way.whole, frozen_array(receipt.q if receipt.q is not None else via), (led, *way.notes)
 
         gap = Gap(t, t, timeline.state_before(t), next_move(timeline, segments[1]))
         made = fill(timeline, gap, receipt.command_id, by_way, self.joiner(motion))
         made = made._replace(start=start)
-        notes = (*timing.notes, Note(NoteCode.BY_A_VIA))
-        return self.accept(self._as_planned(receipt, motion, made, timing, notes, t), made, t)
+        return self.accept(self._as_planned(receipt, motion, made, timing, timing.notes, t), made, t)
 
     def _scale(self, command: ScaleTime, now: float | None) -> Receipt:
         """Let what is scheduled run at another pace.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from interfaces.val2.errors import CheckFinding
     from interfaces.val2.source import SourceFile
-    from vrs.model import RobotModel
+    from robots.robot import Robot
 
 _Found: TypeAlias = "tuple[Path, CheckFinding]"
 """What was found, and in which file."""
@@ -83,7 +83,7 @@ def check(
     sources = [source for source, _ in checked if source is not None]
     if not static and len(sources) == len(programs) and not _wrong(_of(found, sources, program)):
         found += _rehearsed(
-            dict(zip(programs, sources, strict=True)), program, val_robot(name, tip).arm, program_files(files)
+            dict(zip(programs, sources, strict=True)), program, val_robot(name, tip), program_files(files)
         )
     found = _once(found)
     if as_json:
@@ -112,18 +112,18 @@ def _of(found: list[_Found], sources: Sequence[SourceFile], program: str) -> lis
     return [one for one in found if one[1].error.program in ("", *counted)]
 
 
-def _rehearsed(
-    sources: Mapping[Path, SourceFile], program: str, model: RobotModel, files: Path | None
-) -> list[_Found]:
+def _rehearsed(sources: Mapping[Path, SourceFile], program: str, robot: Robot, files: Path | None) -> list[_Found]:
     """What only planning shows: a program on a virtual arm alone."""
+    from interfaces.val2.motion import conventions_of
     from interfaces.val2.playing import rehearse
     from interfaces.val2.source import joined
 
+    spoken = conventions_of(robot)
+    found = rehearse(joined([*sources.values()], program), robot.arm, files=files, conventions=spoken).findings
     path_of = {one.name: path for path, source in sources.items() for one in source.programs}
     usual = next(iter(sources))
     return [
-        (path_of.get(found.error.program, usual), replace(found, error=found.error.at(place=found.place)))
-        for found in rehearse(joined([*sources.values()], program), model, files=files).findings
+        (path_of.get(one.error.program, usual), replace(one, error=one.error.at(place=one.place))) for one in found
     ]
 
 

@@ -59,8 +59,6 @@ def console(
         raise InvalidValueError("token-file", str(token_file), "left out without --connect")
     if delay != "none" and (alone or connect is not None):
         raise InvalidValueError("delay", delay, "left out with --connect and --alone: no robot is begun here")
-    if name != USUAL and connect is not None:
-        raise InvalidValueError("robot", name, "left out with --connect: the server has its own")
     robot = val_robot(name, tip)
     program_files(files)
     delay_profile(delay)
@@ -68,12 +66,12 @@ def console(
     if alone:
         _alone(robot, files, spoken)
     elif connect is not None:
-        _connected(connect, token_file, files, spoken)
+        _connected(connect, robot, token_file, files, spoken)
     else:
         typer.echo("vrs: starting both robots ..", err=True)
         with local_server(["--robot", robot.found_by, "--delay", delay, "--link-loss", "hold"]) as url:
             typer.echo(f"vrs: {url}/view shows both robots", err=True)
-            _connected(url, None, files, spoken)
+            _connected(url, robot, None, files, spoken)
 
 
 def _alone(robot: Robot, files: Path | None, dialect: Dialect | None) -> None:
@@ -85,20 +83,22 @@ def _alone(robot: Robot, files: Path | None, dialect: Dialect | None) -> None:
     model = robot.arm
     engine = Engine(model, q=home(model), clock=ManualClock(0.0))
     what = f"{software()}, a virtual {robot.name} alone"
-    _converse(arm_for(engine), Control(), WallClock(), files, dialect, what)
+    _converse(arm_for(engine, robot), Control(), WallClock(), files, dialect, what)
 
 
-def _connected(url: str, token_file: Path | None, files: Path | None, dialect: Dialect | None) -> None:
+def _connected(
+    url: str, robot: Robot, token_file: Path | None, files: Path | None, dialect: Dialect | None
+) -> None:
     from interfaces import connect
     from interfaces.messages.control import Role
     from interfaces.stream.access import read_tokens
-    from interfaces.val2.monitor.control import LeaseControl
+    from interfaces.val2.monitor.control import RemoteControl
     from interfaces.val2.motion import arm_for
 
     token = None if token_file is None else read_tokens(token_file).get(Role.OPERATOR)
-    with connect(url, token=token, name="vrs console") as connection:
+    with connect(url, token=token, name="vrs console", alters=True) as connection:
         what = f"{software()}, connected to {url}"
-        _converse(arm_for(connection), LeaseControl(connection), connection, files, dialect, what)
+        _converse(arm_for(connection, robot), RemoteControl(connection), connection, files, dialect, what)
 
 
 def _converse(

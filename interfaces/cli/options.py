@@ -105,7 +105,7 @@ Tip: TypeAlias = Annotated[
     str, option("--tip LINK", "Of a description: the link at the end of the arm; as FILE#LINK says it, too.")
 ]
 BodyName: TypeAlias = Annotated[
-    str, option("--body BODY", "What is real of the robot: bullet, mujoco, ideal or another of its own.")
+    str, option("--body BODY", "What is real of the robot: bullet, mujoco, of an arm ideal, or another of its own.")
 ]
 ARCHITECTURE, ROOM, OPERATOR_LOSS = "timeline", "empty", "stop"
 """Unless others are asked for."""
@@ -216,7 +216,7 @@ def program_files(directory: Path | None) -> Path | None:
     return directory
 
 
-OF_ARMS: Final = ("offset", "lead", "body", "friction", "pose", "scene")
+OF_ARMS: Final = ("offset", "lead", "friction", "pose", "scene")
 """Options that arms alone have, by their names without dashes."""
 OF_VAL: Final = ("val-port", "val-files")
 """The same of robots that VAL-II has places for."""
@@ -225,7 +225,7 @@ OF_BASES: Final = ("architecture", "room", "jobs", "operator-loss")
 OF_CAMERAS: Final = ("camera",)
 """The same of robots that pictures are made of."""
 OF_SITES: Final = (
-    "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead", "body",
+    "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead",
     "friction", "pose", "reports", "reached-as",
 )  # fmt: skip
 """The same of robots that have a site, as thin clients haven't."""

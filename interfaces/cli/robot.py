@@ -58,12 +58,13 @@ if TYPE_CHECKING:
 
 
 def thin_client(
-    name: str, address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool
+    name: str, body: str, address: str, model: Path | None, room: Room, token_file: Path | None, *, until_eof: bool
 ) -> None:
     """Run a thin client until a signal comes or its body fails.
 
     Args:
         name: What `robots.load` finds it by.
+        body: What is real of it; the usual one if empty.
         address: Where it listens for RSP, HOST:PORT.
         model: Of its devices; its own unless given.
         room: Where it drives.
@@ -83,11 +84,11 @@ def thin_client(
     device = client.device(ThinClient)
     if device is None:
         raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
-    robot = read_model(device.model if model is None else model)
+    make, robot = client.body(body), read_model(device.model if model is None else model)
     tokens = tokens_for(where.host, token_file)
     keys = None if tokens is None else keys_of(tokens, token_file)
     sock = bind(where.host, where.port)
-    _end(run_loop(_serve_rsp(client.body()(room=room), device, robot, keys, sock, until_eof=until_eof)))
+    _end(run_loop(_serve_rsp(make(room=room), device, robot, keys, sock, until_eof=until_eof)))
 
 
 def _end(problem: str) -> None:
@@ -191,9 +192,8 @@ def robot(
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
     if rsp is not None:
         left_out(ctx, "a thin client has nothing of the kind", OF_SITES)
-        thin_client(
-            USUAL_CLIENT if name == USUAL else name, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof
-        )
+        client = USUAL_CLIENT if name == USUAL else name
+        thin_client(client, body, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
         return
     if rsp_model is not None:
         raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
@@ -228,7 +228,9 @@ def robot(
         loss = OperatorLoss(one_of("operator-loss", operator_loss, OperatorLoss))
         hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
         jobs = RunnerConfig(loss=loss)
-        made = PacedBody(PacedConfig(chosen, room_of(room), architecture, driven, jobs, hands, halting=halting))
+        made = PacedBody(
+            PacedConfig(chosen.with_body(body), room_of(room), architecture, driven, jobs, hands, halting=halting)
+        )
         kind, remark = architecture, POLICY_SAYS[loss]
     else:
         from interfaces.runtime.live.physics_body import PhysicsBody

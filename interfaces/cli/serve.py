@@ -165,8 +165,10 @@ def serve(
         raise InvalidValueError("robot", ", ".join(names), "each robot once")
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
     number_in("max-age", max_age, 0.01, 2.0, unit=" s")
-    for robot in robots:
-        robot.body("" if "body" in untaken(robot) else body)
+    # Of several robots, those that have a body of that name get it.
+    bodies = [body if robot.has_body(body) else "" for robot in robots]
+    for robot, named in zip(robots, bodies, strict=True):
+        robot.body(named if any(bodies) else body)
     if len(robots) > 1:
         left_out(ctx, "of several robots each is started here", ("robot-at", "robot-token-file"))
     if robot_at is not None:
@@ -212,7 +214,7 @@ def serve(
     if advice:
         typer.echo(f"vrs: {advice}", err=True)
     given = {
-        "offset": behind, "max-age": f"{max_age:g}", "body": body, "room": room, "architecture": architecture,
+        "offset": behind, "max-age": f"{max_age:g}", "room": room, "architecture": architecture,
         "operator-loss": operator_loss,
     }  # fmt: skip
     if scene is not None:
@@ -225,8 +227,9 @@ def serve(
     access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []
-    for k, (robot, path) in enumerate(zip(robots, records, strict=True)):
+    for k, (robot, named, path) in enumerate(zip(robots, bodies, records, strict=True)):
         kept = {option: value for option, value in given.items() if option not in untaken(robot)}
+        kept["body"] = named
         if record is not None and not robot.is_base:
             kept["reports"] = f"{RATE:g}"
         options = [
@@ -406,13 +409,15 @@ async def _serve(
             if one.val_files is not None:
                 assert isinstance(operator.twins, ArmTwins)
                 client = LocalClient(operator.hub, operator.clock, "VAL-II terminals", operator.server.kick)
-                room = served_room(client, operator.twins.operator, one.val_files, software())
+                room = served_room(client, operator.twins.operator, one.robot, one.val_files, software())
                 operator.hub.alterer = room
                 routes.append(PageTerminalServer(room, access).route)
                 if one.val_port is not None:
                     val_room = room
             if not one.robot.is_base:
-                routes += Plans(one.robot.arm, access, operator.clock).routes
+                journal = operator.twins.site.journal
+                assert journal is not None
+                routes += Plans(journal, access, operator.clock).routes
                 routes += Poses(one.robot.arm, one.recordings, access, operator.clock).routes
             routes += _station(one, serving, taught=taught is not None).routes
             if one.folder:

@@ -14,7 +14,7 @@ import msgspec
 from interfaces.messages import Change, History, Order, Outcome, RefusalCode
 from interfaces.messages.fields import MOST_NAMES
 from interfaces.messages.requests import NAMED, CommandName, portable
-from vrs.commands import Cancel, Command, InsertVia, Redo, Retime
+from vrs.commands import Cancel, Command, Grip, InsertVia, Redo, Retime
 from vrs.engine import Engine
 from vrs.errors import InvalidValueError, UnknownCommandError, VrsError
 from vrs.ledger import Receipt, Status
@@ -265,7 +265,10 @@ class Journal:
         if name is not None and receipt is not None and receipt.status is not Status.REJECTED:
             last = self.names[-1] if self.names else None
             if last is None or (last.command_id, last.label) != (receipt.command_id, name.label):
-                self._named = msgspec.structs.replace(name, command_id=receipt.command_id)
+                # The hand does at its time what it's told now; motion is another one from now on.
+                begin = receipt.execute_at if isinstance(order.command, Grip) else None
+                t = name.t if begin is None else begin
+                self._named = msgspec.structs.replace(name, command_id=receipt.command_id, t=t)
                 self.names.append(self._named)
         if receipt is None:
             return Outcome(order.number, now, None, why)
@@ -281,7 +284,8 @@ class Journal:
         """Write down what was done to the engine, here or by others; the number of the newest edit."""
         done, timeline = self._done, self.engine.timeline
         if done is not None and timeline.version == done.version:
-            if timeline is not self._timeline:
+            # What moves no joint has a name that's told, too: a grip.
+            if timeline is not self._timeline or self._named is not None:
                 self._write(timeline, done.command_id, ())
             self._newest = max(self._newest, done.command_id)
         elif timeline is not self._timeline:

@@ -250,6 +250,8 @@ class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     link_loss: Word | None = None
     """Of an operator's site: what the robot is to do when nothing fresh is heard, `halt` or `hold`; absent: the
     robot's own."""
+    alters: bool = False
+    """Whether it runs programs whose path others may correct: while it has control, their `correct` comes to it."""
 
 
 class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
@@ -678,16 +680,20 @@ class Plan(Message, frozen=True, omit_defaults=True, gc=False, tag="plan"):
 
 
 class PathCorrection(Leased, frozen=True, omit_defaults=True, gc=False, eq=False, tag="correct"):
-    """Correct the path that a program alters on a channel. The answer is a `Corrected` or a `Problem`."""
+    """Correct the path that a program alters on a channel. The answer is a `Corrected` or a `Problem`.
 
-    sender: ClassVar[Party] = Party.HOLDER
+    The server hands it on to a client with `alters` that has control, which answers the server in its turn.
+    """
+
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
-    """The client's own; the answer has it, too."""
+    """The sender's own; the answer has it, too."""
     channel: Annotated[int, Meta(ge=0, le=255)]
     """Of the program's ALTER."""
     offset: Twist
     """Translation [m], then rotation vector [rad], (6,): along which axes, and whether it adds up, says ALTER."""
-    epoch: Epoch
+    epoch: Epoch | None = None
+    """Of who has control, or shares it; others may correct a program of a client with `alters`."""
     at: Time | None = None
     """For when it's meant [s], within 0.2 s of now; absent: for when it comes."""
 
@@ -700,7 +706,7 @@ class PathCorrection(Leased, frozen=True, omit_defaults=True, gc=False, eq=False
 class Corrected(Message, frozen=True, omit_defaults=True, gc=False, tag="corrected"):
     """A correction is on the path."""
 
-    sender: ClassVar[Party] = Party.SERVER
+    sender: ClassVar[Party] = Party.EITHER
     number: Number
     """Of the `PathCorrection`."""
     late: Text = ""
@@ -711,9 +717,13 @@ QueueWish: TypeAlias = RequestControl | Withdraw | GiveControl
 """What a client of a class asks of the queue."""
 LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume | QueueWish
 """What a client asks of the lease; a `Lease` or a `Problem` answers it."""
-Question: TypeAlias = Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem | PathCorrection | Who
+Question: TypeAlias = (
+    Hello | Ping | Pong | LeaseWish | Beat | Survey | Impair | Problem | PathCorrection | Corrected | Who
+)
 """Control messages that a client sends."""
-Notice: TypeAlias = Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | Corrected | Present
+Notice: TypeAlias = (
+    Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | PathCorrection | Corrected | Present
+)
 """Control messages that a server sends."""
 
 

@@ -39,7 +39,7 @@ from interfaces.messages.fields import (
 )
 from interfaces.messages.segments import Dof, Segmented, Segments
 from vrs.checks import finite
-from vrs.commands import Command, Motion, MotionCommand, Profile
+from vrs.commands import Command, MotionCommand
 from vrs.errors import InvalidValueError
 from vrs.ledger import Receipt
 from vrs.model import Array
@@ -195,17 +195,13 @@ class CommandName(Record, frozen=True, omit_defaults=True, gc=False):
     label: Label = ""
     """As the order said."""
     speed: Share = 1.0
-    """Of a move, as it was commanded; so are motion and profile."""
-    motion: Motion = Motion.JOINT
-    profile: Profile = Profile.PARABOLIC
+    """Of a move, as it was commanded."""
 
     @classmethod
     def of(cls, command: Command, label: str, command_id: int, t: float) -> CommandName:
         """Name a command from a time [s] on."""
         name = cls(command_id, t, str(command.__struct_config__.tag), label)
-        if not isinstance(command, MotionCommand):
-            return name
-        return replace(name, speed=command.speed, motion=command.motion, profile=command.profile)
+        return replace(name, speed=command.speed) if isinstance(command, MotionCommand) else name
 
 
 class Order(Leased, frozen=True, omit_defaults=True, gc=False, tag="order"):

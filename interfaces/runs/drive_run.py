@@ -35,7 +35,7 @@ class DriveCase:
     delay: str = "mon"
     """Profile of either direction, as the command line spells it."""
     robot: str = USUAL_BASE
-    """A mobile robot, as `robots.load` finds it, or `bare`."""
+    """A mobile robot, as `robots.load` finds it, and `@BODY` for another body than its usual one; or `bare`."""
     operator: str = "mixed"
     seed: int = 0
     length: Annotated[float, within(1.0, 3600.0, "s")] = 120.0
@@ -64,9 +64,13 @@ class DriveCase:
             InvalidValueError: If there's no such robot.
             FormatError: If its module can't be imported.
         """
-        bare = self.robot == BARE
-        known = load(USUAL_BASE if bare else self.robot) if self.known is None else self.known
-        return known, BARE if bare else ""
+        name, at, body = self.robot.rpartition("@")
+        if self.robot == BARE:
+            name, body = USUAL_BASE, BARE
+        elif not at or not body.isidentifier():
+            name, body = self.robot, ""
+        robot = load(name) if self.known is None else self.known
+        return robot, body and robot.body_name(body)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 import numpy as np
@@ -27,8 +28,10 @@ from vrs.commands import (
     SteerCommand,
     Target,
 )
+from vrs.engine import Engine
 from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
 from vrs.model import Array, RobotModel, home
+from vrs.notes import NoteCode
 
 SCHEMA = "vrs-plan/1"
 LATEST = 3600.0
@@ -40,7 +43,8 @@ MAX_COMMANDS = 5000
 
 ALLOWED = (
     'a line is a JSON object: {"issue": seconds, "move": target} with optional execute, register, speed, '
-    'motion, profile, insertion; or {"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
+    "motion, profile, insertion, deviation_mm, pace, acceleration, tool; or "
+    '{"issue": seconds, "payload": {"mass_kg": number}}; or {"issue": seconds, '
     '"release": true}; or {"issue": seconds, "grip_mm": opening, or "open"} with optional execute, register; '
     'or {"thing": {name, at, box or cylinder, mass}}, with a header that has floor; '
     "or, first, a header with schema, title, start, floor; each with an optional comment"
@@ -114,6 +118,10 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     motion: Motion | None = None
     profile: Profile | None = None
     insertion: Insertion | None = None
+    deviation_mm: float | Literal["inf"] | None = None
+    pace: float | None = None
+    acceleration: float | None = None
+    tool: _Where | None = None
     payload: _Load | None = None
     release: bool | None = None
     grip_mm: float | Literal["open"] | None = None
@@ -123,7 +131,8 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 _HEADER = ("schema", "title", "start", "floor")
-_MOTION = ("register", "execute", "speed", "motion", "profile", "insertion")
+_HOW = ("deviation_mm", "pace", "acceleration", "tool")
+_MOTION = ("register", "execute", "speed", "motion", "profile", "insertion", *_HOW)
 
 
 def default_plan(model: RobotModel) -> RunPlan:
@@ -253,6 +262,10 @@ def _motion(line: _Line, move: _Move, where: str, model: RobotModel) -> PlannedM
         motion=line.motion or Motion.JOINT,
         profile=line.profile or Profile.PARABOLIC,
         insertion=line.insertion or Insertion.SPLICE,
+        deviation=0.0 if line.deviation_mm is None else float(line.deviation_mm) / 1000.0,
+        pace=1.0 if line.pace is None else line.pace,
+        acceleration=1.0 if line.acceleration is None else line.acceleration,
+        tool=None if line.tool is None else _pose(line.tool.xyz, line.tool.zyz_deg),
     )
     return PlannedMotion(where, registered, command)
 
@@ -345,3 +358,136 @@ def _rot_z(angle: float) -> Array:
 def _rot_y(angle: float) -> Array:
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+FIRST = 0.5
+"""When the first move of a plan that was written begins [s]."""
+_BEFORE = 1000
+"""So many commands before one that rounds a corner, the one that it passes is looked for."""
+_ROUNDED = frozenset({NoteCode.PASSES_VIA, NoteCode.BEGINS_BEFORE})
+_RESTS = 1e-9
+"""Speed [rad/s, m/s] that counts as none."""
+_THERE = 1e-6
+"""Joints that differ by less [rad, m] are the same place."""
+
+
+def written_plan(engine: Engine, title: str, labels: Mapping[int, str]) -> bytes:
+    """Write what an engine is still to do as a plan file: the moves and grips that begin after its present.
+
+    A run of it takes the same path as far as that begins at rest: a move by a via is written as two, of which the
+    second passes the via; one that interrupted another as it was commanded.
+
+    Args:
+        engine: Of an arm.
+        title: Of the plan.
+        labels: What commands are called, by their ids.
+
+    Raises:
+        InvalidValueError: If nothing is planned, or for longer than a plan file may hold.
+    """
+    now, timeline = engine.now(), engine.timeline
+    spans: dict[int, tuple[float, float]] = {}
+    for segment in timeline.segments[max(timeline.index_at(now), 0) :]:
+        if segment.command_id is not None:
+            start, _ = spans.get(segment.command_id, (segment.start, 0.0))
+            spans[segment.command_id] = start, segment.start + segment.duration
+    moves = {command_id: span for command_id, span in spans.items() if span[0] > now}
+    grips = [goal for goal in engine.scheduler.grips if goal.t > now]
+    if not moves:
+        raise InvalidValueError("plan", "nothing", "moves that are still to come")
+    begin = min(start for start, _ in moves.values())
+    zero = min([begin, *(goal.t for goal in grips)]) - FIRST
+    legs: list[tuple[int, float, _Leg]] = []
+    for command_id, (start, end) in moves.items():
+        rounds = _rounds(engine, command_id)
+        passed = _passed(engine, command_id, now) if rounds else None
+        if passed is not None and passed not in spans:
+            # It was planned anew with less of the limits, as part of what passes its end.
+            legs += [(passed, start, leg) for leg in _legs(engine, passed, start, start, first=not legs)]
+        legs += [(command_id, start, leg) for leg in _legs(engine, command_id, start, end, first=not legs)]
+    header = {"schema": SCHEMA, "title": title, "start": _people(timeline.sample(begin), engine)}
+    lines: list[dict[str, Any]] = [header]
+    for command_id, start, leg in legs:
+        label = {"comment": labels[command_id]} if labels.get(command_id) else {}
+        lines.append({"issue": 0.0, "execute": start - zero, **leg, **label})
+    for goal in grips:
+        opening = "open" if goal.opening == math.inf else 1000.0 * goal.opening
+        lines.append({"issue": 0.0, "execute": goal.t - zero, "grip_mm": opening})
+    if (latest := max(line["execute"] for line in lines[1:])) > LATEST:
+        raise InvalidValueError("plan", f"moves for {latest:.0f} s", f"up to {LATEST:g} s")
+    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in lines).encode()
+
+
+_Leg: TypeAlias = dict[str, Any]
+"""Fields of a move's line beside its times."""
+
+
+def _rounds(engine: Engine, command_id: int) -> bool:
+    """Whether a move passes the end of the one before it."""
+    command, codes = engine.command(command_id), {note.code for note in engine.notes(command_id)}
+    rounded = command is not None and command.deviation > 0 and NoteCode.BY_A_VIA not in codes
+    return rounded and not codes.isdisjoint(_ROUNDED)
+
+
+def _passed(engine: Engine, command_id: int, now: float) -> int | None:
+    """The command whose end a move passes, where that was still to begin."""
+    for other in range(command_id - 1, max(0, command_id - _BEFORE), -1):
+        if engine.command(other) is not None:
+            receipt = engine.receipt(other)
+            if receipt.superseded_by == command_id and receipt.execute_at is not None:
+                return other if receipt.execute_at > now else None
+    return None
+
+
+def _legs(engine: Engine, command_id: int, start: float, end: float, *, first: bool) -> list[_Leg]:
+    """A planned move as lines' fields: two where it goes by a via, one more where it leads on to the next one."""
+    timeline, command, append = engine.timeline, engine.command(command_id), {"insertion": Insertion.APPEND.value}
+    at_end = timeline.sample(end)
+    target = None if command is None else engine.receipt(command_id).q
+    target = at_end if target is None else target
+    joined: _Leg = append
+    if not first and _rounds(engine, command_id):
+        joined = {**append, **_deviating(0.0 if command is None else command.deviation)}
+    elif not first and np.abs(timeline.state_before(start).qd).max() > _RESTS:
+        joined = {"insertion": Insertion.SPLICE.value}
+    ways: list[tuple[Array, _Leg]] = [(target, joined)]
+    for note in engine.notes(command_id):
+        if note.code is NoteCode.BY_A_VIA:
+            deviation, *via = (float(value) for value in note.values)
+            ways = [(np.array(via), joined), (target, {**append, **_deviating(deviation)})]
+    how = {} if command is None else _how(command)
+    legs: list[_Leg] = [{"move": _people(q, engine), **how, **joins} for q, joins in ways]
+    rests = np.abs(timeline.sample(end, derivative=1)).max() <= _RESTS
+    if end > start and rests and np.abs(at_end - target).max() > _THERE:
+        legs.append({"move": _people(at_end, engine), **how, "motion": Motion.JOINT.value, **append})
+    return legs
+
+
+def _how(command: MotionCommand) -> _Leg:
+    """How a command moves: fields of a line that aren't what they are without it."""
+    how: _Leg = {"speed": command.speed, "motion": command.motion.value, "profile": command.profile.value}
+    how |= {name: getattr(command, name) for name in ("pace", "acceleration") if getattr(command, name) != 1.0}
+    if command.tool is not None:
+        how["tool"] = {"xyz": command.tool[:3, 3].tolist(), "zyz_deg": _zyz_deg(command.tool[:3, :3])}
+    return how
+
+
+def _deviating(deviation: float) -> _Leg:
+    if deviation == 0.0:
+        return {}
+    return {"deviation_mm": "inf" if deviation == math.inf else 1000.0 * deviation}
+
+
+def _people(q: Array, engine: Engine) -> list[float]:
+    """Joints in degrees, of prismatic ones in metres."""
+    return [x if j in engine.model.prismatic else math.degrees(x) for j, x in enumerate(q.tolist())]
+
+
+def _zyz_deg(R: Array) -> list[float]:
+    """ZYZ Euler angles of a rotation [deg]."""
+    across = math.hypot(R[0, 2], R[1, 2])
+    if across < _THERE:
+        a, c = 0.0, math.atan2(R[1, 0], R[1, 1])
+    else:
+        a, c = math.atan2(R[1, 2], R[0, 2]), math.atan2(R[2, 1], -R[2, 0])
+    return [math.degrees(angle) for angle in (a, math.atan2(across, R[2, 2]), c)]

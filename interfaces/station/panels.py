@@ -33,11 +33,7 @@ class Offer(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A part of the page.
-
-    Its script is `static/NAME.js`, a module that exports the component `Panel`; or, before it's made one,
-    `mount(station, box)`, which is called with the panel's own element.
-    """
+    """A part of the page: its script is `static/NAME.js`, a module that exports the component `Panel`."""
 
     name: str
     """Of the panel and of its files; small letters."""

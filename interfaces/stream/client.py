@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeAlias
@@ -95,6 +95,7 @@ class ClientCore:
         name: str = "client",
         token: str | None = None,
         encoding: Encoding = Encoding.MSGPACK,
+        alters: bool = False,
     ) -> None:
         """Begin without a connection.
 
@@ -104,9 +105,10 @@ class ClientCore:
             name: For people, 1 to 100 characters.
             token: What the role needs.
             encoding: How its messages are written.
+            alters: See `control.Hello`.
         """
         self._expects = expects
-        self._hello = control.Hello(control.PROTOCOL, Role(role), name, token)
+        self._hello = control.Hello(control.PROTOCOL, Role(role), name, token, alters=alters)
         self.encoding = Encoding(encoding)
         self.port = RemotePort()
         self.sync = ClockSync()
@@ -118,6 +120,8 @@ class ClientCore:
         self.lease: control.Lease | None = None
         self.newest: dict[type, Any] = {}
         """What was told of the robot and the way to it, the newest of each kind of `News`."""
+        self.corrections: deque[control.PathCorrection] = deque(maxlen=KEPT)
+        """What others want of the path of a program here, to be taken and answered."""
         self.sessions = 0
         """Sessions so far; a further one begins with nothing that was followed, and perhaps another timeline."""
         self.lapses = 0
@@ -191,6 +195,11 @@ class ClientCore:
             self._beat_due = min(self._beat_due, now)
         return number
 
+    def correct(self, answer: control.Corrected | control.Problem) -> None:
+        """Answer one of `corrections`; without a connection nobody waits for that."""
+        if self.phase is Phase.OPEN:
+            self._send(answer)
+
     def answer(self, number: int) -> Replied | None:
         """What the server answered; None while it hasn't."""
         return self._answers.get(number)
@@ -222,6 +231,8 @@ class ClientCore:
             self._note(message, now)
         elif isinstance(message, control.Problem):
             self._complain(message)
+        elif isinstance(message, control.PathCorrection):
+            self.corrections.append(message)
         elif isinstance(message, control.Corrected):
             self._settle(message.number, message)
         elif isinstance(message, News):

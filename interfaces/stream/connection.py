@@ -235,7 +235,9 @@ class Connection:
     def correct(
         self, channel: int, offset: ArrayLike, *, at: float | None = None, wait: float = 1.0
     ) -> Corrected | Problem:
-        """Correct the path that a program at the server's terminals alters: VAL-II's ALTER.
+        """Correct the path that a program alters: VAL-II's ALTER, at the server's terminals or a client's console.
+
+        At the server's it needs the lease, or a share of it.
 
         Args:
             channel: Of the program's ALTER.
@@ -248,9 +250,21 @@ class Connection:
         """
 
         def ask(number: int) -> PathCorrection:
-            return PathCorrection(number, channel, np.asarray(offset, float), self._epoch, at)
+            epoch = self._epoch if self._session.core.epoch else None
+            return PathCorrection(number, channel, np.asarray(offset, float), epoch, at)
 
-        return self._ask(Corrected, ask, wait, leased=True)
+        return self._ask(Corrected, ask, wait)
+
+    def take_corrections(self) -> list[PathCorrection]:
+        """What others have asked of the path of a program here since this was called last; see `connect`."""
+        with self._session.changed:
+            taken = list(self._session.core.corrections)
+            self._session.core.corrections.clear()
+        return taken
+
+    def answer_correction(self, answer: Corrected | Problem) -> None:
+        """Tell who asked what came of one of them."""
+        self._session.do(lambda _: self._session.core.correct(answer))
 
     def go(self, goal: Goal, *, wait: float = 5.0) -> Tasks | Problem:
         """Send the robot to a goal.

@@ -9,6 +9,7 @@ import base64
 import logging
 import math
 import secrets
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
@@ -51,6 +52,8 @@ POLICY, TOO_LARGE, FAILED, RESTART, TRY_AGAIN = 1008, 1009, 1011, 1012, 1013
 
 SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
+MOST_HANDED_ON = 256
+"""Corrections that are with the client whose program they're for, at most."""
 PRESENCE = 0.2
 """At most so often are clients told who is here [s]."""
 SURVEYED = 0.1
@@ -271,7 +274,10 @@ class HubSession:
         elif isinstance(message, TaskOrder):
             self.outbox.put(self.hub.task(seat, message, now))
         elif isinstance(message, PathCorrection):
-            self.outbox.put(self.hub.correct(seat, message, now))
+            if (corrected := self.hub.correct(seat, message, now)) is not None:
+                self.outbox.put(corrected)
+        elif isinstance(message, Corrected | Problem):
+            self.hub.corrected(seat, message)
 
     def _say_who(self, message: Who, now: float) -> None:
         """Tell who is here, and from now on when that changes."""
@@ -473,6 +479,9 @@ class Hub:
         self._workers = workers
         self.alterer: PathAlterer | None = None
         """What a client's corrections of the path go to; None where no programs run."""
+        self._handed_on: OrderedDict[int, tuple[SessionState, SessionState, int]] = OrderedDict()
+        """Corrections that a client with programs is to answer, by their numbers: it, whose and which they are."""
+        self._numbered = 0
         self.news: dict[type, tuple[int, News]] = {}
         """What every client is told when it changes, by its kind, with its version."""
         self.news_version = 0
@@ -666,6 +675,7 @@ class Hub:
             before.seat = None
         if member is not None and self.access.invitations is not None:
             self.access.invitations.remember(seat.key, member)
+        seat.alters = hello.alters
         self._served[seat] = session
         self.leasing.note(seat, here=True)
         return seat, self._welcome(seat, resumed, now)
@@ -753,12 +763,18 @@ class Hub:
             return Problem(ProblemCode.OUT_OF_RANGE, refusal, order.number)
         return self._workers.tasks(order.number)
 
-    def correct(self, seat: SessionState, wish: PathCorrection, now: float) -> Corrected | Problem:
-        """Let who commands correct the path of a program that asks for that; or say why not."""
-        if not may_send(seat.role, wish.sender):
+    def correct(self, seat: SessionState, wish: PathCorrection, now: float) -> Corrected | Problem | None:
+        """Let who commands correct the path of a program that asks for that; or say why not.
+
+        An operator corrects the path of another client's program, where that has control and said so; None: it was
+        handed on, and `corrected` has the answer.
+        """
+        if not covers(seat.role, Role.OPERATOR):
             return Problem(ProblemCode.NOT_ALLOWED, "a viewer corrects nothing", wish.number)
         leasing = self.leasing
-        if not leasing.commanding(seat) or leasing.lease.refused(wish.epoch, now=now) is not None:
+        if (runner := leasing.holder) is not None and runner is not seat and runner.alters:
+            return self._hand_on(seat, runner, wish, now)
+        if not leasing.commanding(seat) or leasing.lease.refused(wish.epoch or 0, now=now) is not None:
             text = "only who has control, or shares it, corrects the path"
             return Problem(ProblemCode.STALE_EPOCH, text, wish.number)
         if self.alterer is None:
@@ -768,3 +784,28 @@ class Hub:
         except VrsError as error:
             return Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number)
         return Corrected(wish.number, late)
+
+    def _hand_on(
+        self, seat: SessionState, runner: SessionState, wish: PathCorrection, now: float
+    ) -> Problem | None:
+        """Let the client whose program it is correct its path."""
+        session = self._served.get(runner)
+        if session is None or session.outbox.is_full:
+            text = f"{runner.name}, whose program it is, can't be reached"
+            return Problem(ProblemCode.OUT_OF_RANGE, text, wish.number)
+        self._numbered += 1
+        self._handed_on[self._numbered] = runner, seat, wish.number
+        if len(self._handed_on) > MOST_HANDED_ON:
+            self._handed_on.popitem(last=False)
+        at = now if wish.at is None else wish.at
+        session.outbox.put(PathCorrection(self._numbered, wish.channel, wish.offset, None, at))
+        return None
+
+    def corrected(self, runner: SessionState, answer: Corrected | Problem) -> None:
+        """Tell who asked what came of a correction that was handed on; what answers none is passed over."""
+        known = self._handed_on.get(answer.number or 0)
+        if known is None or known[0] is not runner:
+            return
+        _, seat, number = self._handed_on.pop(answer.number or 0)
+        if (session := self._served.get(seat)) is not None:
+            session.outbox.put(msgspec.structs.replace(answer, number=number))

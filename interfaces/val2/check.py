@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -14,15 +15,15 @@ from interfaces.val2.compiler import compiled_step
 from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.expressions import Closure, kind_of
-from interfaces.val2.functions import UNRESERVED, row_of
+from interfaces.val2.expressions import Closure, kind_of, unset
+from interfaces.val2.functions import FUNCTIONS, UNRESERVED, row_of
 from interfaces.val2.grammar import SIGNIFICANT
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler, arguments_of
 from interfaces.val2.memory import Slots
 from interfaces.val2.motion import Arm, EngineRobot
 from interfaces.val2.parser import lines_of, split_comment
 from interfaces.val2.rows import NUMBERS
-from interfaces.val2.signals import HIGHEST, legal, settable
+from interfaces.val2.signals import HIGHEST, legal, require_bits, settable
 from interfaces.val2.source import SourceFile, read_all, says_dialect
 from interfaces.val2.structure import Structure, StructureBlock, survey
 from interfaces.val2.syntax import (
@@ -187,7 +188,8 @@ class _Checker(ProgramCompiler):
     def _check(self, i: Instruction, n: int) -> None:
         self._statement = i
         if i.passed is not None and i.keyword not in forms.UNAVAILABLE:
-            detail = f"{i.keyword} {i.passed}".rstrip() + " is passed over"
+            why = f": {forms.PASSED[i.keyword]}" if i.keyword in forms.PASSED else ""
+            detail = f"{i.keyword} {i.passed}".rstrip() + f" is passed over{why}"
             self._warnings.append(ValError("No meaning here", detail, place=i.at))
         self._errors += self._names.wrong_calls(i)
         before = len(self._errors)
@@ -196,6 +198,12 @@ class _Checker(ProgramCompiler):
             match i:
                 case Instruction("PARAMETER", (operand,), (name,)) if (value := literal(operand)) is not None:
                     forms.PARAMETERS[name].require(value, "Value out of range", operand.at)
+                case Instruction("=", (Variable("bits", ()), operand)) if literal(operand) is not None:
+                    detail = f"a variable is set; of signals: {STATEMENTS['BITS'].usage}"
+                    self._warnings.append(ValError("Looks like an instruction", detail, place=i.at))
+                case Instruction("BITS", (_, count, operand)) if (value := literal(operand)) is not None:
+                    if (many := 1.0 if count is None else literal(count)) is not None:
+                        require_bits(many, value)
         except ValError as error:
             if len(self._errors) == before:
                 self._errors.append(error.at(place=i.at))
@@ -216,13 +224,14 @@ class _Checker(ProgramCompiler):
             made = super().of_kind(kind, e)
         except ValError as failure:
             error, made = failure.at(place=e.at), _nothing
-        if isinstance(e, Variable) and not (e.name in self._usable or e.name.upper() in UNRESERVED):
-            located = e.prefix == "#" or kind in ("location", "frame", "point")
-            what = "Undefined location" if located else "Undefined value"
-            error = ValError(what, f"{e.name}; nothing in the file sets it", place=e.at)
+        known = isinstance(e, Variable) and (e.name in self._usable or e.name.upper() in UNRESERVED)
+        if error is None and isinstance(e, Variable) and not known:
             if e.name in self._reported:
                 return made
             self._reported.add(e.name)
+            error = unset(e, location=kind in ("location", "frame", "point"))
+            if e.name.upper() not in FUNCTIONS:
+                error = ValError(error.what, f"{error.detail}; nothing in the file sets it", place=e.at)
         self._errors += [] if error is None else [error]
         return made
 
@@ -352,6 +361,7 @@ _CHECKS: Final[Mapping[str, Callable[[float], object]]] = {
     "seconds": _range(0, 1e6, "seconds, not negative"),
     "time": _range(0, 1e9, "seconds, not negative"),
     "speed": _range(1e-3, 1e6, "a speed above 0"),
+    "opening": _range(0, math.inf, "an opening of 0 mm or above"),
     "mode": _range(0, 3, "a mode, 0 to 3"),
     "priority": _range(1, HIGHEST, f"a priority, 1 to {HIGHEST:g}"),
     **{what: _range(n[0], n[-1], f"a {what}, {n[0]} to {n[-1]}") for what, n in NUMBERS.items()},

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from interfaces.val2.context import Code, Context, StepFunction, Warned
 from interfaces.val2.errors import ValError
-from interfaces.val2.forms import UNAVAILABLE
+from interfaces.val2.forms import PASSED, UNAVAILABLE
 from interfaces.val2.grammar import undefined
 from interfaces.val2.instructions import STATEMENTS, ProgramCompiler
 from interfaces.val2.memory import Slots
@@ -57,7 +57,8 @@ def compiled_step(x: ProgramCompiler, n: int, i: Instruction) -> StepFunction:
 def _passed_over(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     if i.keyword in UNAVAILABLE:
         raise ValError("Not available", f"{i.keyword}: {UNAVAILABLE[i.keyword]}", place=i.at)
-    warning = Warned(f"{i.keyword} has no meaning here: program {x.program.name}, step {n + 1}")
+    why = f": {PASSED[i.keyword]}" if i.keyword in PASSED else ""
+    warning = Warned(f"{i.keyword} is passed over{why}, program {x.program.name}, step {n + 1}")
 
     def warn(_: Slots) -> int:
         x.context.warn(warning)

@@ -70,6 +70,14 @@ def kind_of(expression: Expression, known: Mapping[str, str] = {}) -> str:
             return _GIVEN.get(gives, gives)
 
 
+def unset(variable: Variable, key: Key | None = None, *, location: bool = False) -> ValError:
+    """The error of reading what is unset; it shows the form of a function of that name."""
+    error, row = undefined(variable, key, location=location), FUNCTIONS.get(variable.name.upper())
+    if row is None or variable.indices:
+        return error
+    return ValError(error.what, f"{error.detail}; the function is {row.usage}", place=variable.at)
+
+
 class Expressions:
     """Makes closures of the expressions of one program."""
 
@@ -148,7 +156,7 @@ class Expressions:
                 if standing is not None:
                     value: Value = standing(s)
                     return value
-                raise undefined(variable, k, location=location)
+                raise unset(variable, k, location=location)
             return slot.value
 
         return value

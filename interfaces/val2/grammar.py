@@ -66,7 +66,7 @@ _SHOWN: Final = {
 }  # fmt: skip
 """Tokens as errors name them; others by the word that they are."""
 _UNTOLD: Final = frozenset(
-    {"COMMENT", "CALL_OF_NUMBERS", "_CHANNEL", "_CLEAR", "_LAST", "KIND", "REST", "UNIT", "BRACKETS"}
+    {"COMMENT", "NOTE", "CALL_OF_NUMBERS", "_CHANNEL", "_CLEAR", "_LAST", "KIND", "REST", "UNIT", "BRACKETS"}
 )
 """Tokens that errors don't name."""
 _PIECE: Final = re.compile(r"[#$]?[A-Za-z0-9][A-Za-z0-9_.]*|[=<>]+|.", re.DOTALL)
@@ -203,6 +203,10 @@ def undefined(i: Instruction) -> ValError | None:
     """The error of a line whose word is no instruction; None where it's one."""
     if i.keyword in forms.IGNORED or i.keyword in STATEMENTS:
         return None
+    named = forms.INSTRUCTIONS.items()
+    begun = sorted(name for name, row in named if name.startswith(i.keyword) and "whole" not in row.tags)
+    if len(begun) > 1:
+        return ValError("Ambiguous instruction", f"{i.keyword}: {', '.join(begun)}", place=i.at)
     detail = f"{i.keyword}{did_you_mean(i.keyword, forms.INSTRUCTIONS)}"
     if i.keyword in ("ELSEIF", "ELIF"):
         detail = f"{i.keyword}; allowed: ELSE on a line, and an IF of its own on the next"
@@ -266,6 +270,10 @@ class _Trees:
         """REMARK: a comment alone."""
         text = parts[1] or ""
         return BLANK, (text[1:] if text[:1].isspace() else text).rstrip()
+
+    def note(self, parts: list[Any]) -> tuple[Instruction, str]:
+        """A comment alone that a name seems to begin."""
+        return BLANK, parts[0][1:].rstrip()
 
     def passed(self, parts: list[Any]) -> Instruction:
         """What is recognised but has no meaning here."""

@@ -22,8 +22,9 @@ _INDENTED: Final = 250
 _BREAK: Final = re.compile(r"[\r\n]")
 _BEFORE: Final = re.compile(r"\s*(?:[0-9]+\.\??(?=\s|$)\s*)?(?:[0-9]+(?![A-Za-z0-9_.]))?\s*")
 """A step's number, and a label."""
-_NO_STATEMENT: Final = re.compile(r"$|;|#(?![A-Za-z])")
+_NO_STATEMENT: Final = re.compile(r"$|;|#(?![A-Za-z][A-Za-z0-9_.]*\s*(\[|=))")
 _CODE: Final = re.compile(r'[^";#]*(?:(?:"[^"]*"|#(?=[A-Za-z]))[^";#]*)*')
+_VALUE: Final = re.compile(r'\s*(?:#(?=[A-Za-z]))?[^";#]*(?:"[^"]*"[^";#]*)*')
 
 
 def lines_of(text: str) -> list[str]:
@@ -83,13 +84,23 @@ def cached_step(text: str, line: int) -> Step:
     return Step(statement, label, comment, TextPosition(line, begin + 1))
 
 
-def split_comment(text: str, line: int) -> tuple[str, str | None]:
+def no_statement(text: str) -> bool:
+    """Whether a line of a program is blank, or a comment alone."""
+    return _NO_STATEMENT.match(text.lstrip()) is not None
+
+
+def split_comment(text: str, line: int, *, value: bool = False) -> tuple[str, str | None]:
     """The code of a line, and its comment.
+
+    Args:
+        text: The line.
+        line: Its number, from 1.
+        value: Whether it's a value or a directive, not a step: there a name with `#` can stand first alone.
 
     Raises:
         ValError: If a string has no closing quote.
     """
-    found = _CODE.match(text)
+    found = (_VALUE if value else _CODE).match(text)
     code = found[0] if found else ""
     behind = text[len(code) :]
     if behind.startswith('"'):

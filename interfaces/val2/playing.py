@@ -26,7 +26,7 @@ from interfaces.val2.context import (
 from interfaces.val2.controller import STATEMENT, TURN, Controller
 from interfaces.val2.corrections import Corrections, Corrector
 from interfaces.val2.errors import CheckFinding, TextPosition, ValError
-from interfaces.val2.motion import Arm, EngineRobot
+from interfaces.val2.motion import Arm, ArmConventions, EngineRobot
 from interfaces.val2.printer import print_step
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
@@ -213,6 +213,7 @@ def rehearse(
     listeners: Listeners | None = None,
     start: Array | None = None,
     files: Path | None = None,
+    conventions: ArmConventions | None = None,
 ) -> Rehearsal:
     """Carry out the first program of a file, once.
 
@@ -226,12 +227,14 @@ def rehearse(
         listeners: Who hears what it says; nobody by default.
         start: Where the arm stands [rad], (n,); in its `nominal` pose unless given.
         files: Where the program's files are; what it writes doesn't get there.
+        conventions: See `Arm`.
     """
     now, computed, clock = 0.0, 0.0, ManualClock(0.0)
     engine = Engine(model, q=home(model) if start is None else start, clock=clock)
     rng = random.Random(0)  # noqa: S311 - RANDOM is no secret
     units = Units(files, keeps=False)
-    player = Player(source, Arm(EngineRobot(engine)), listeners or Listeners(), rng, units=units, skips=True)
+    arm = Arm(EngineRobot(engine), conventions=conventions)
+    player = Player(source, arm, listeners or Listeners(), rng, units=units, skips=True)
     player.begin(0.0)
     while True:
         player.advance(now)

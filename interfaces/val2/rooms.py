@@ -6,8 +6,6 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
-import numpy as np
-
 from interfaces.messages.control import Role
 from interfaces.stream.access import Access
 from interfaces.stream.local import LocalClient
@@ -17,15 +15,15 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.control import ServedControl, SharedController
 from interfaces.val2.monitor.files import Files
 from interfaces.val2.monitor.monitor import TerminalMonitor
-from interfaces.val2.motion import Arm, SiteRobot
+from interfaces.val2.motion import Arm, SiteRobot, conventions_of
 from interfaces.val2.parser import parse_expression
 from vrs.clock import Clock
 from vrs.model import Array
-from vrs.scheduler import FRESH
 
 if TYPE_CHECKING:
     from interfaces.teleop import OperatorSite
     from interfaces.teleop.virtual_arm import VirtualArm
+    from robots.robot import Robot
 
 HOST: Final = "127.0.0.1"
 """Terminals come from this machine only: there's no encryption."""
@@ -86,13 +84,7 @@ class TerminalRoom:
         Raises:
             ValError: If none does, or it can't be.
         """
-        arm = self._shared.controller.arm
-        if not arm.altering(channel, now=now):
-            raise ValError("Path isn't altered", f"no program has ALTER on for channel {channel}")
-        if abs(at - now) > FRESH:
-            raise ValError("Illegal value", f"a correction is for now, within {FRESH:g} s")
-        values = (*(1000.0 * offset[:3]).tolist(), *np.degrees(offset[3:]).tolist())
-        outcome = arm.correct(values, given=at, now=now)
+        outcome = self._shared.correct(channel, offset, at, now=now)
         self.soon()
         if outcome is None or outcome.receipt is None or outcome.reason:
             raise ValError("Path can't be altered so", "" if outcome is None else outcome.reason)
@@ -121,19 +113,22 @@ class TerminalRoom:
         return min([self._shared.next_deadline(), *(terminal.next_deadline() for terminal in self._terminals)])
 
 
-def served_room(client: LocalClient, site: OperatorSite[VirtualArm], directory: Path, version: str) -> TerminalRoom:
+def served_room(
+    client: LocalClient, site: OperatorSite[VirtualArm], robot: Robot, directory: Path, version: str
+) -> TerminalRoom:
     """The room at a server's robot, which a client of the server in its own process moves.
 
     Args:
         client: The client.
         site: Where the robot is.
+        robot: Which that is.
         directory: Of LOAD and STORE.
         version: Name and version of the program.
     """
-    robot = SiteRobot(
+    port = SiteRobot(
         site, lambda command, _now: client.execute(command), fault_poll_interval=FAULT_POLL, has_fingers=True
     )
-    arm = Arm(robot)
+    arm = Arm(port, conventions=conventions_of(robot))
     controller = Controller(arm, parameters=arm.parameters, now=client.now())
     shared = SharedController(controller, ServedControl(client))
     return TerminalRoom(shared, client, Files(directory, examples=examples()), f"{version}, VAL-II")

@@ -14,8 +14,8 @@ from interfaces.val2.errors import TextPosition, ValError
 
 Kind: TypeAlias = Literal[
     "real", "condition", "seconds", "time", "speed", "percent", "joint", "mode", "timer", "task", "channel",
-    "priority", "signal", "output", "string", "alike", "location", "frame", "point", "any", "label", "count",
-    "program", "variable", "array", "name", "text",
+    "opening", "priority", "signal", "output", "string", "alike", "location", "frame", "point", "any", "label",
+    "count", "program", "variable", "array", "name", "text",
 ]  # fmt: skip
 """What an operand is: a `location` is a `frame` or a precision `point`, a `variable` something to be set, a `name`
 what isn't read, and operands that are `alike` are numbers or strings, all of them; those of the first line are

@@ -82,6 +82,18 @@ def settable(number: float) -> int:
     raise _illegal(number, OUTPUTS, INTERNAL)
 
 
+def require_bits(count: float, value: float) -> None:
+    """See that a value has a bit for each of some signals, and no others.
+
+    Raises:
+        ValError: If it hasn't.
+    """
+    most = 2.0**count - 1.0
+    if not 0 <= value <= most or value % 1:
+        many = f"{count:.9g} signals" if count > 1 else "1 signal; allowed too: BITS first, count = value"
+        raise ValError("Illegal value", f"{value:.9g}: 0 to {most:.10g} for {many}")
+
+
 def group(first: float, count: float) -> range:
     """The numbers of a group of signals.
 
@@ -142,9 +154,7 @@ class Signals:
         """
         numbers = group(first, count)
         settable(numbers[0])
-        most = (1 << len(numbers)) - 1
-        if not 0 <= value <= most or value % 1:
-            raise ValError("Illegal value", f"{value:.9g}: 0 to {most} for {len(numbers)} signals")
+        require_bits(len(numbers), value)
         self.set(number if int(value) >> i & 1 else -number for i, number in enumerate(numbers))
 
     def pulse(self, number: float, seconds: float, *, now: float) -> None:

@@ -17,7 +17,7 @@ from interfaces.val2 import forms, grammar
 from interfaces.val2.errors import TextPosition, ValError, syntax_error
 from interfaces.val2.grammar import name_of, undefined
 from interfaces.val2.memory import KINDS, MOST_DIMENSIONS
-from interfaces.val2.parser import lines_of, parse_header, parse_rule, read_line, split_comment
+from interfaces.val2.parser import lines_of, no_statement, parse_header, parse_rule, read_line, split_comment
 from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.signals import SignalRule
 from interfaces.val2.syntax import BLANK, Apply, Expression, Instruction, Number, Program, Step, Text, Variable
@@ -50,12 +50,12 @@ _STAND_INS: Final = {
     "FOR": "FOR n = 1 TO 1", "CASE": "CASE 1 OF", "VALUE": "VALUE 1:", "ANY": "ANY",
 }  # fmt: skip
 """What keeps a structure whole where one of its lines can't be read."""
-_SHAPES: Final = (
-    ("IF", re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE)),
-    ("WHILE", re.compile(r"\bDO\s*(;|$)", re.IGNORECASE)),
-    ("CASE", re.compile(r"\bOF\s*(;|$)", re.IGNORECASE)),
-    ("FOR", re.compile(r"=.*\bTO\b", re.IGNORECASE)),
-)
+_SHAPES: Final = {
+    "IF": re.compile(r"\bTHEN\s*(;|$)", re.IGNORECASE),
+    "WHILE": re.compile(r"\bDO\s*(;|$)", re.IGNORECASE),
+    "CASE": re.compile(r"\bOF\s*(;|$)", re.IGNORECASE),
+    "FOR": re.compile(r"=.*\bTO\b", re.IGNORECASE),
+}
 """How lines look that begin a structure, whatever their first word."""
 
 
@@ -256,8 +256,10 @@ class _File:
             match self._steps[-1].statement:
                 case Instruction("PARAMETER", (Number(value),), ("VPLUS",)):
                     self._speak(VPLUS if value else VAL2)
-        elif (code := split_comment(line, number)[0]).strip():
-            self._value(code, line, number, strict=strict)
+        elif self._section or not no_statement(line):
+            code = split_comment(line, number, value=True)[0]
+            if code.strip():
+                self._value(code, line, number, strict=strict)
 
     def _speak(self, dialect: Dialect) -> None:
         """Read the program that is being read, and what comes, in a dialect."""
@@ -270,7 +272,7 @@ class _File:
         if word == ".PROGRAM":
             self._begin(parse_header(line, number))
             return
-        code = split_comment(line, number)[0]
+        code = split_comment(line, number, value=True)[0]
         behind = indented(code) + len(word)
         if code[behind:].strip():
             raise syntax_error(f"allowed: {word} alone on its line", number, indented(code, behind) + 1)
@@ -440,8 +442,9 @@ def _stand_in(line: str, number: int, error: ValError) -> Step:
     label, word, assigns = head.groups() if head is not None else (None, None, None)
     keyword = (word or "").upper()
     if keyword and not assigns and keyword not in forms.INSTRUCTIONS:
-        shaped = (kind for kind, shape in _SHAPES if shape.search(line))
-        keyword = closest(keyword, forms.INSTRUCTIONS) or next(shaped, "")
+        shaped = next((kind for kind, shape in _SHAPES.items() if shape.search(line)), "")
+        near = closest(keyword, forms.INSTRUCTIONS)
+        keyword = shaped if not near or near in _SHAPES else near
     jumps = keyword == "IF" and _JUMP.search(line)
     stands = "" if assigns or jumps else _STAND_INS.get(keyword, "")
     label = "" if label is None or error.what == "Invalid label" else label

@@ -14,7 +14,7 @@ from interfaces.runtime.plan import PlannedMotion, PlannedPayload, RunPlan
 from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSession, placed_in, unheard
 from interfaces.val2.corrections import Corrections
 from interfaces.val2.errors import ValError
-from interfaces.val2.motion import Arm, SiteRobot
+from interfaces.val2.motion import Arm, SiteRobot, conventions_of
 from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
@@ -135,7 +135,7 @@ def play(
         )
         operator = _Operator(session, limit, source.name)
         site = SiteRobot(session.operator, operator.execute, has_fingers=scene is not None)
-        val = Arm(site, parameters=operator.parameters, gripped=operator.gripped)
+        val = Arm(site, conventions=conventions_of(robot), parameters=operator.parameters, gripped=operator.gripped)
         rng = random.Random(seed)  # noqa: S311 - RANDOM is no secret
         operator.player = player = Player(
             source, val, listeners or Listeners(), rng, units=Units(files), corrections=corrections

@@ -27,6 +27,7 @@ DONE: Final = 1.0
 EXISTS, NOT_THERE, ENDED, NOT_READY = -500.0, -501.0, -504.0, -508.0
 NOT_OPEN, NOT_ATTACHED, NOT_VALID = -513.0, -516.0, -517.0
 MESSAGES: Final = {
+    DONE: "*Success*",
     EXISTS: "*File already exists*", NOT_THERE: "*Nonexistent file*", ENDED: "*Unexpected end of file*",
     NOT_READY: "*Device not ready*", NOT_OPEN: "*File not opened*", NOT_ATTACHED: "*Not attached to logical unit*",
     NOT_VALID: "*Invalid file specification*",
@@ -70,7 +71,7 @@ class Units:
         """
         self.directory, self._keeps, self.warn = directory, keeps, warn
         self._units: dict[int, _Unit] = {}
-        self._status: dict[int, float] = {}
+        self._status: dict[int, float] = {TERMINAL: DONE}
         self._written: dict[Path, str | None] = {}
         """Files as they'd be; None for deleted."""
 

@@ -4,22 +4,19 @@ Lengths are millimetres and angles degrees, as everywhere in the language. A dia
 a transformation are: VAL-II's O, A, T turn it by R = Rz(O - 90) Ry(A + 90) Rz(T), V+'s yaw, pitch, roll by
 R = Rz Ry Rz as they are. Values are poses, so that files of both dialects mean what they say beside each other.
 
-VAL's world is the base frame turned by 180 degrees about the waist, and its hand the last link turned by 180
-degrees about its own axis, at the flange.
+What VAL's world, hand and joints are on an arm is told by `motion.conventions`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.puma560 import parameters
-from vrs.model import Array, Limits, frozen_array
+from vrs.model import Array, frozen_array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,15 +59,8 @@ Value: TypeAlias = float | str | Transformation | PrecisionPoint
 
 NULL: Final = Transformation(np.eye(4))
 """`NULL`: no translation, no turn; O, A, T of it are 90, -90, 0."""
-
-
-FLANGE: Final = 1000.0 * parameters.FLANGE
-"""From the wrist's centre to the flange along the tool's axis [mm]."""
 _VERTICAL: Final = 1e-9
 """Sine of the angle between tool and vertical under which O and T can't be told apart."""
-_OFFSETS: Final = (0.0, 180.0, 180.0, 0.0, 0.0, 0.0)
-"""VAL's joint values less the Robotics Toolbox's [deg]."""
-_HALF_TURN: Final = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
 def about_x(angle: float) -> Transformation:
@@ -163,36 +153,3 @@ def _wrapped(degrees: float) -> float:
     """In (-180, 180]."""
     turned = math.remainder(degrees, 360.0)
     return 180.0 if turned == -180.0 else turned + 0.0
-
-
-def to_val_joints(q: Sequence[float] | Array, limits: Limits) -> PrecisionPoint:
-    """VAL's joint values [deg] of joints [rad], (6,), on the turn on which they stand within the limits."""
-    joints = []
-    for value, low, offset in zip(np.degrees(q).tolist(), np.degrees(limits.q_min).tolist(), _OFFSETS, strict=True):
-        joints.append(value + offset - (360.0 if low + offset > 0.0 else 0.0))
-    return PrecisionPoint(tuple(joints))
-
-
-def from_val_joints(point: PrecisionPoint, limits: Limits) -> Array:
-    """Joints [rad], (6,), of VAL's joint values [deg]; within the limits or not."""
-    q = []
-    for value, low, offset in zip(point.joints, np.degrees(limits.q_min).tolist(), _OFFSETS, strict=True):
-        q.append(math.radians(value - offset + (360.0 if low + offset > 0.0 else 0.0)))
-    return np.array(q)
-
-
-def from_base(X: Array) -> Transformation:
-    """The flange in VAL's world, of the pose of the last link in the base frame, (4, 4) [m]."""
-    pose = _HALF_TURN @ X @ _HALF_TURN
-    pose[:3, 3] *= 1000.0
-    pose[:3, 3] += FLANGE * pose[:3, 2]
-    return Transformation(pose)
-
-
-def to_base(flange: Transformation) -> Array:
-    """The pose of the last link in the base frame, (4, 4) [m], of the flange in VAL's world."""
-    pose = np.array(flange.X)
-    pose[:3, 3] -= FLANGE * pose[:3, 2]
-    pose[:3, 3] /= 1000.0
-    X: Array = _HALF_TURN @ pose @ _HALF_TURN
-    return X

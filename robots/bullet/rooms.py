@@ -211,6 +211,35 @@ class Door(Record, frozen=True, omit_defaults=True, gc=False):
         return fastest * self.length * (1.0 if self.sliding else abs(self.swing))
 
 
+Standing = Block | Column | Person | Door
+"""What a robot may run into, or what into it."""
+_BELOW = -100.0
+"""Where things are that aren't there [m]."""
+
+
+def moves(thing: Standing) -> bool:
+    """Whether it ever moves, comes or goes."""
+    return isinstance(thing, Person | Door) or thing.start > -math.inf or thing.end < math.inf
+
+
+def solid(thing: Standing) -> Block | Column:
+    """The box or the cylinder that it is, as it stands at time 0."""
+    if isinstance(thing, Person):
+        x, y = thing.at(0.0)
+        return Column(thing.name, x, y, thing.radius, thing.height, known=False)
+    return thing.at(0.0) if isinstance(thing, Door) else thing
+
+
+def pose_at(thing: Standing, t: float) -> tuple[float, float, float, float]:
+    """Where the middle of a thing is at a time [s]: x, y, z [m], heading [rad]; far below while it isn't there."""
+    if isinstance(thing, Person):
+        return *thing.at(t), thing.height / 2, 0.0
+    if isinstance(thing, Door):
+        thing = thing.at(t)
+    angle = thing.angle if isinstance(thing, Block) else 0.0
+    return thing.x, thing.y, thing.height / 2 if thing.stands(t) else _BELOW, angle
+
+
 VERSION = 1
 """Of the format."""
 MOST_BYTES = 262_144
@@ -255,6 +284,11 @@ class Room:
     def things(self) -> tuple[Block | Column, ...]:
         """Blocks, then columns."""
         return *self.blocks, *self.columns
+
+    @property
+    def standing(self) -> tuple[Standing, ...]:
+        """All that stands and walks in it: things, people, doors."""
+        return *self.things, *self.people, *self.doors
 
     def known(self) -> Room:
         """Return what the operator's map has: without unknown things, people and doors."""

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from robots.bullet.rooms import Block, Column, Room
+from robots.bullet.rooms import Block, Room, Standing, moves, pose_at, solid
 from robots.robot import Closing
 from robots.solids import LinkShape
+from robots.vehicle import FLOOR_FRICTION, THING_FRICTION
 from vrs.errors import InvalidValueError, VrsError
 from vrs.model import Array
 
@@ -114,7 +115,6 @@ class World(Closing):
 
 RAY, THING, CHASSIS, WHEEL, FLOOR = 1, 2, 4, 8, 16
 """Collision groups: wheels meet the floor, chassis and rays meet things. PyBullet's rays are of group 1."""
-_BELOW = -100.0
 
 
 class RoomBodies:
@@ -127,52 +127,30 @@ class RoomBodies:
         shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
         self.floor = floor = int(bullet.createMultiBody(0.0, shape))
         """PyBullet's id of the floor."""
-        bullet.changeDynamics(floor, -1, lateralFriction=1.0)
+        bullet.changeDynamics(floor, -1, lateralFriction=FLOOR_FRICTION)
         bullet.setCollisionFilterGroupMask(floor, -1, FLOOR, WHEEL)
         self.names: dict[int, str] = {}
         """Names of things by PyBullet's body ids."""
-        self._coming: list[tuple[int, Block | Column, list[float], list[float]]] = []
-        for thing in room.things:
-            position, turn = _pose(thing)
-            shape = self._box(thing) if isinstance(thing, Block) else self._cylinder(thing.radius, thing.height)
-            body = self._stand(shape, thing.name, position, turn)
-            if thing.start > -math.inf or thing.end < math.inf:
-                self._coming.append((body, thing, position, turn))
-        self._walking = [
-            (self._stand(self._cylinder(person.radius, person.height), person.name, [0.0, 0.0, _BELOW]), person)
-            for person in room.people
-        ]
-        self._doors = [
-            (self._stand(self._box(door.at(0.0)), door.name, *_pose(door.at(0.0))), door) for door in room.doors
-        ]
-        self._open = [door.share(0.0) for door in room.doors]
-        self._there = [True] * len(self._coming)
-        self._moved = math.nan
-        self.at(0.0)
+        self._moving: list[tuple[int, Standing]] = []
+        self._poses: dict[int, tuple[float, float, float, float]] = {}
+        for thing in room.standing:
+            body = self._stand(thing)
+            self.names[body] = thing.name
+            if moves(thing):
+                self._moving.append((body, thing))
 
     @property
-    def moving(self) -> bool:
+    def changing(self) -> bool:
         """Whether anything ever moves, comes or goes."""
-        return bool(self._coming or self._walking or self._doors)
+        return bool(self._moving)
 
     def at(self, t: float) -> None:
         """Bring everything to where it is at a time [s]."""
-        if t == self._moved:
-            return
-        self._moved = t
-        put = self._world.bullet.resetBasePositionAndOrientation
-        for body, person in self._walking:
-            x, y = person.at(t)
-            put(body, [x, y, person.height / 2], [0.0, 0.0, 0.0, 1.0])
-        for k, (body, door) in enumerate(self._doors):
-            if (share := door.share(t)) != self._open[k]:
-                self._open[k] = share
-                put(body, *_pose(door.at(t)))
-        for k, (body, thing, (x, y, z), turn) in enumerate(self._coming):
-            there = thing.stands(t)
-            if there != self._there[k]:
-                self._there[k] = there
-                put(body, [x, y, z if there else _BELOW], turn)
+        for body, thing in self._moving:
+            pose = pose_at(thing, t)
+            if pose != self._poses[body]:
+                self._poses[body] = pose
+                self._world.bullet.resetBasePositionAndOrientation(body, *_transform(pose))
 
     def cast(self, origins: Array, directions: Array, height: float, reach: float) -> Array:
         """Return how far level rays go, as `FloorPlan.cast` does, but nothing from inside of a thing.
@@ -192,28 +170,24 @@ class RoomBodies:
         )
         return np.array([hit[2] * reach if hit[0] >= 0 else math.inf for hit in hits])
 
-    def _box(self, block: Block) -> int:
-        bullet = self._world.bullet
-        half = [block.length / 2, block.width / 2, block.height / 2]
-        return int(bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half))
-
-    def _cylinder(self, radius: float, height: float) -> int:
-        bullet = self._world.bullet
-        return int(bullet.createCollisionShape(bullet.GEOM_CYLINDER, radius=radius, height=height))
-
-    def _stand(self, shape: int, name: str, position: list[float], turn: list[float] | None = None) -> int:
-        bullet = self._world.bullet
-        body = bullet.createMultiBody(0.0, shape, -1, position, [0.0, 0.0, 0.0, 1.0] if turn is None else turn)
-        bullet.changeDynamics(body, -1, lateralFriction=0.5)
+    def _stand(self, thing: Standing) -> int:
+        bullet, block, pose = self._world.bullet, solid(thing), pose_at(thing, 0.0)
+        if isinstance(block, Block):
+            half = [block.length / 2, block.width / 2, block.height / 2]
+            shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half)
+        else:
+            shape = bullet.createCollisionShape(bullet.GEOM_CYLINDER, radius=block.radius, height=block.height)
+        body = int(bullet.createMultiBody(0.0, shape, -1, *_transform(pose)))
+        bullet.changeDynamics(body, -1, lateralFriction=THING_FRICTION)
         bullet.setCollisionFilterGroupMask(body, -1, THING, CHASSIS | RAY)
-        self.names[int(body)] = name
-        return int(body)
+        self._poses[body] = pose
+        return body
 
 
-def _pose(thing: Block | Column) -> tuple[list[float], list[float]]:
-    """Where a thing's middle is [m], and how it's turned, a quaternion."""
-    angle = thing.angle if isinstance(thing, Block) else 0.0
-    return [thing.x, thing.y, thing.height / 2], [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
+def _transform(pose: tuple[float, float, float, float]) -> tuple[list[float], list[float]]:
+    """A place [m], and a turn about the vertical as a quaternion."""
+    x, y, z, angle = pose
+    return [x, y, z], [0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)]
 
 
 Picture = NDArray[np.uint8]

@@ -1,4 +1,4 @@
-"""CUBO's body in PyBullet, addressed by bindings: names of what an effector moves and of what a sensor measures.
+"""CUBO's body, addressed by bindings: names of what an effector moves and of what a sensor measures.
 
 It plans nothing and decides nothing: a thin client's body.
 """
@@ -16,6 +16,7 @@ from robots.cubo import parameters as p
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.mobile.position import FusedPosition, TruePosition
+from robots.simulated import WORLDS
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import clipped
@@ -45,6 +46,7 @@ class CuboBody(MobileBody):
         self,
         posture: ArrayLike | None = None,
         *,
+        world: str = next(iter(WORLDS)),
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
@@ -55,6 +57,7 @@ class CuboBody(MobileBody):
 
         Args:
             posture: (x, y, θ) [m, m, rad]; where the room says, unless given.
+            world: One of `robots.simulated.WORLDS`.
             room: A room, or the name of one that comes with the package; only a floor, unless given.
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
@@ -76,7 +79,9 @@ class CuboBody(MobileBody):
         self._touched = False
         self._sounding = 0.0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
-        super().__init__(p.CUBO, posture, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses)
+        super().__init__(
+            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses
+        )
         self._position = TruePosition(self) if exact else FusedPosition(self)
         self._posture = self._position.posture()
 
@@ -158,9 +163,7 @@ class CuboBody(MobileBody):
 
     def angles(self) -> Values:
         """Angles of the right arm, the left arm and the head [rad]."""
-        joints = [self._joint(k) for k in range(len(p.CUBO.limbs))]
-        states = self.world.bullet.getJointStates(self.body_id, joints)
-        return tuple(float(state[0]) for state in states)
+        return self.vehicle.limbs()
 
     @property
     def step(self) -> float:
@@ -190,18 +193,7 @@ class CuboBody(MobileBody):
             self._events.append("bumper")
         self._touched = bool(self.touching)
 
-    def _joint(self, limb: int) -> int:
-        return 2 + len(p.CUBO.casters) + limb
-
     def _swing(self, limb: Limb, number: int, values: Values) -> None:
         speed = (abs(values[1]) if len(values) > 1 else 0.0) or limb.speed
-        self.world.bullet.setJointMotorControl2(
-            self.body_id,
-            self._joint(number),
-            self.world.bullet.POSITION_CONTROL,
-            targetPosition=min(max(values[0], limb.low), limb.high),
-            positionGain=0.2,
-            velocityGain=1.0,
-            force=limb.torque,
-            maxVelocity=min(max(speed, 1e-3), limb.speed),
-        )
+        angle = min(max(values[0], limb.low), limb.high)
+        self.vehicle.swing(number, angle, min(max(speed, 1e-3), limb.speed))

@@ -11,6 +11,7 @@ from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, W
 from robots.cubo.shapes import shapes
 from robots.mobile.shapes import links
 from robots.robot import Appearance, Robot, ThinClient
+from robots.simulated import WORLDS
 from vrs.mobile import Wheels
 
 ROBOT: Final = Robot(
@@ -23,7 +24,7 @@ ROBOT: Final = Robot(
         "cubo",
     ),
     Appearance(shapes, partial(links, CUBO)),
-    {"bullet": CuboBody},
+    {world: partial(CuboBody, world=world) for world in WORLDS},
     (ThinClient(MODEL_FILE, MOVES),),
 )
 """The thin client: it plans nothing, RSP drives it."""

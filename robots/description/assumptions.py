@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from robots.description.description import Description, Joint, JointKind, Link, corners_of
+from robots.description.rigid import rigid_chain
 from robots.description.tips import tip_of
 from vrs.model import Array
 
@@ -18,7 +19,13 @@ TURN, SLIDE = math.pi, 0.5
 TURN_SPEED, SLIDE_SPEED = 1.0, 0.1
 """Largest speeds where none are said [rad/s], [m/s]."""
 SPEED_TIME, ACCELERATION_TIME = 0.25, 0.1
-"""In what time joints reach their largest speeds, and their largest accelerations, where nothing is said [s]."""
+"""In what time joints reach their largest speeds, and their largest accelerations, where nothing is said [s].
+
+The speeds in a longer one where the efforts that are said don't give that.
+"""
+_MOTIONS, _OFTEN, _LONGEST = 256, 0.95, 2.5
+"""Random poses and motions in which efforts are looked at, in what part of them they must do, and the longest time
+that is assumed for it all the same [s]."""
 ROTOR_TIME: Final = 0.02
 """In what time a drive with nothing on it reaches its joint's largest speed, where its inertia isn't said [s]."""
 ROTOR_MOST: Final = (0.1, 10.0)
@@ -48,10 +55,13 @@ def completed(description: Description, tip: str = "") -> Description:
     chosen = tip_of(description, tip)
     notes: list[str] = []
     on_chain = [joint for joint in description.chain(chosen) if joint.moves]
-    joints = tuple(_assumed(joint) for joint in description.joints)
-    _say_joints(on_chain, notes)
-    links = _with_inertia(description, notes)
-    done = replace(description, joints=joints, links=links, tip=chosen)
+    links = _with_inertia(description, [])
+    done = replace(description, joints=tuple(map(_assumed, description.joints)), links=links, tip=chosen)
+    speed_time = _speed_time(done, [joint.name for joint in on_chain if not joint.qdd_max])
+    if speed_time > SPEED_TIME:
+        done = replace(done, joints=tuple(_assumed(joint, speed_time) for joint in description.joints))
+    _say_joints(on_chain, notes, speed_time)
+    _with_inertia(description, notes)
     if not tip and not description.tip:
         leaves = [leaf for leaf in description.leaves() if leaf != chosen]
         others = f"; other ends are {', '.join(leaves)}" if leaves else ""
@@ -97,7 +107,34 @@ _KEYS: Final = {
 """What limits are called in TOML, and here."""
 
 
-def _assumed(joint: Joint) -> Joint:
+def _speed_time(done: Description, silent: list[str]) -> float:
+    """In what time joints of which no acceleration is said reach their largest speeds [s].
+
+    Random motions at their speeds and accelerations ask no more, as a rule, than the efforts that are said.
+
+    Args:
+        done: Nothing is missing.
+        silent: Their names.
+    """
+    moving = [joint for joint in done.chain(done.tip) if joint.moves]
+    effort = np.array([joint.effort or np.inf for joint in moving])
+    if not silent or not np.isfinite(effort).any():
+        return SPEED_TIME
+    bounds = np.array([(joint.q_min, joint.q_max, joint.qd_max, joint.qdd_max) for joint in moving], dtype=float).T
+    rng = np.random.default_rng(0)
+    size = (_MOTIONS, len(moving))
+    q, qd = rng.uniform(bounds[0], bounds[1], size), bounds[2] * rng.uniform(-1.0, 1.0, size)
+    qdd, free = bounds[3] * rng.choice([-1.0, 1.0], size), np.array([joint.name in silent for joint in moving])
+    chain, still = rigid_chain(done, done.tip), np.zeros(size)
+    others = chain.inverse_dynamics(q, qd, np.where(free, 0.0, qdd), gravity=done.gravity)
+    friction = np.array([joint.damping for joint in moving]) * np.abs(qd) + [joint.friction for joint in moving]
+    asked = np.abs(chain.inverse_dynamics(q, still, np.where(free, qdd, 0.0), gravity=0.0))
+    share = (effort - np.abs(others) - friction) / np.maximum(asked, 1e-12)
+    enough = float(np.quantile(share.min(axis=1), 1.0 - _OFTEN))
+    return min(max(SPEED_TIME, round(SPEED_TIME / enough, 2) if enough > 0.0 else np.inf), _LONGEST)
+
+
+def _assumed(joint: Joint, speed_time: float = SPEED_TIME) -> Joint:
     """A joint with all of its limits."""
     slides, far = joint.kind is JointKind.PRISMATIC, TURN
     if slides:
@@ -105,7 +142,7 @@ def _assumed(joint: Joint) -> Joint:
     elif joint.kind is JointKind.CONTINUOUS:
         far = 2 * TURN
     speed = joint.qd_max or (SLIDE_SPEED if slides else TURN_SPEED)
-    acceleration = joint.qdd_max or speed / SPEED_TIME
+    acceleration = joint.qdd_max or speed / speed_time
     low, high = joint.q_min, joint.q_max
     if low is None and high is None:
         low, high = -far, far
@@ -126,7 +163,7 @@ def _assumed(joint: Joint) -> Joint:
     )
 
 
-def _say_joints(joints: Sequence[Joint], notes: list[str]) -> None:
+def _say_joints(joints: Sequence[Joint], notes: list[str], speed_time: float) -> None:
     """Say what was assumed of joints."""
 
     def say(of: Iterable[Joint], what: str) -> None:
@@ -150,7 +187,8 @@ def _say_joints(joints: Sequence[Joint], notes: list[str]) -> None:
     say(lacking(lambda joint: not joint.qd_max, *sliding), f"no speed is said; assumed {SLIDE_SPEED:g} m/s.")
     say(
         lacking(lambda joint: not joint.qdd_max),
-        f"no acceleration is said; assumed such that the largest speed is reached in {SPEED_TIME:g} s.",
+        f"no acceleration is said; assumed such that the largest speed is reached in {speed_time:g} s"
+        + (", as the efforts don't give more." if speed_time > SPEED_TIME else "."),
     )
     say(
         lacking(lambda joint: not joint.qddd_max),

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from robots.ipr import parameters
 from robots.ipr.model import Kind, model
 from robots.ipr.shapes import NECK, REACH, SCREEN_SIZE, headless, ipr_shapes, micro_shapes, screen_pose
-from robots.mobile.body import MobileBody
+from robots.mobile.body import bodies_of
 from robots.mobile.chassis import Chassis
-from robots.mobile.robot import BareBody
 from robots.mobile.shapes import links
 from robots.onboard.laser import LaserModel
 from robots.robot import Appearance, Display, HeadCamera, Robot
@@ -19,11 +18,7 @@ from robots.solids import LinkShape
 
 
 def _robot(kind: Kind, body: Chassis, shapes: Callable[[], Sequence[LinkShape]], *devices: object) -> Robot:
-    bodies: dict[str, Callable[..., Any]] = {
-        "bullet": partial(MobileBody, body),
-        "bare": partial(BareBody, body),
-    }
-    return Robot(kind, model(kind), Appearance(shapes, partial(links, body)), bodies, devices)
+    return Robot(kind, model(kind), Appearance(shapes, partial(links, body)), bodies_of(body), devices)
 
 
 ROBOT: Final = _robot(

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
 from robots.base import PERIOD, MobileBase
 from robots.description.numbers import BaseNumbers
-from robots.mobile.body import MobileBody
+from robots.mobile.body import bodies_of
 from robots.mobile.chassis import Chassis, Lump
-from robots.mobile.robot import BareBody
+from robots.mobile.robot import MobileRobot
 from vrs.mobile import DriveLimits, Wheels
 
 _SPEED: Final = 0.5
@@ -71,10 +70,9 @@ class Differential:
     chassis: Chassis
     """What its body is made of."""
 
-    def bodies(self) -> dict[str, Callable[..., Any]]:
+    def bodies(self) -> dict[str, Callable[..., MobileRobot]]:
         """What can be real of it, by name."""
-        kinds: dict[str, Callable[..., Any]] = {"bullet": MobileBody, "bare": BareBody}
-        return {name: partial(kind, self.chassis, limits=self.model.limits) for name, kind in kinds.items()}
+        return bodies_of(self.chassis, limits=self.model.limits)
 
 
 def differential(name: str, given: BaseNumbers) -> Differential:

@@ -39,7 +39,7 @@ class MujocoChain(Closing):
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
         body = spec.worldbody
         for link in chain.links:
-            body = body.add_body(pos=link.place, quat=_w_first(link.turn))
+            body = body.add_body(pos=link.place, quat=w_first(link.turn))
             # Its own check refuses inertias that break the triangle inequality, as measured ones do.
             body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
             kind = mujoco.mjtJoint.mjJNT_SLIDE if link.prismatic else mujoco.mjtJoint.mjJNT_HINGE
@@ -48,7 +48,7 @@ class MujocoChain(Closing):
         for j, link in enumerate(chain.links, start=1):
             diagonal, axes = link.principal()
             model.body_mass[j], model.body_ipos[j] = link.inertia.mass, link.centre
-            model.body_inertia[j], model.body_iquat[j] = diagonal, _w_first(quaternion(axes))
+            model.body_inertia[j], model.body_iquat[j] = diagonal, w_first(quaternion(axes))
         data = mujoco.MjData(model)
         mujoco.mj_setConst(model, data)
         self._mujoco, self._model, self._data = mujoco, model, data
@@ -81,7 +81,7 @@ class MujocoChain(Closing):
         """Nothing is held."""
 
 
-def _w_first(turn: Sequence[float]) -> list[float]:
+def w_first(turn: Sequence[float]) -> list[float]:
     """A quaternion (x, y, z, w) as MuJoCo has it."""
     x, y, z, w = turn
     return [w, x, y, z]

@@ -7,6 +7,7 @@ from interfaces.messages import Change, Follow, Order, Scene, ViewForm, Want
 from interfaces.messages.requests import NAMED
 from robots import puma560
 from vrs import Engine, JointTarget, ManualClock, MotionCommand, Retime, SteerCommand
+from vrs.commands import Cancel, Grip
 
 MODEL = puma560.model()
 RATES = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -75,3 +76,18 @@ def test_what_is_rejected_has_no_name_and_the_oldest_are_forgotten():
         lesson.order(MotionCommand(JointTarget(MODEL.poses["nominal"]), execute_at=1.0 + k), str(k))
     names = lesson.watcher()[1].names
     assert [name.label for name in names] == [str(k) for k in range(5, NAMED + 5)]
+
+
+def test_a_grip_has_a_name_from_its_time_on_that_everybody_is_told():
+    lesson = Lesson()
+    watcher, _ = lesson.watcher()
+    lesson.order(MotionCommand(JointTarget(MODEL.poses["ready"]), execute_at=5.0), "ready")
+    before = lesson.site.engine.timeline
+    lesson.order(Grip(0.0, execute_at=7.0), "Close the hand")
+    first, grip = lesson.told(watcher)
+    assert (grip.command_id, grip.kind, grip.label, grip.t) == (2, "grip", "Close the hand", 7.0)
+    assert lesson.watcher()[1].names == (first, grip)
+    # Nothing moves by it, and what comes after it is told as ever.
+    assert lesson.site.engine.timeline is before
+    lesson.order(Cancel(1), "")
+    assert lesson.told(watcher) == [None]

@@ -10,7 +10,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import pybullet_data
 import pytest
 
 from interfaces.cli.main import exit_status
@@ -18,8 +17,9 @@ from interfaces.recording import open_recording
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import Page, station
 from tests.robots.description.stranger import write
+from tests.robots.description.tried import bullet_data
 
-HUSKY = Path(pybullet_data.getDataPath()) / "husky" / "husky.urdf"
+HUSKY = "husky/husky.urdf"
 DIFF = "diff:wheelbase=0.3,wheel=0.06,v=0.4"
 
 
@@ -61,7 +61,7 @@ def test_a_check_says_what_is_there_what_is_assumed_and_how_it_is_stated(robot: 
     facts = json.loads(vrs("check", robot, "--json", "--tip", "lamp"))
     assert (facts["kind"], facts["tip"], facts["driven"]) == ("arm", "lamp", ["pan", "tilt"])
     assert {joint["name"]: joint["upper"] for joint in facts["joints"]}["grip"] == 0.03
-    husky = json.loads(vrs("check", HUSKY, "--json"))
+    husky = json.loads(vrs("check", bullet_data(HUSKY), "--json"))
     assert (husky["kind"], husky["wheelbase_m"]) == ("mobile robot", pytest.approx(0.5708))
 
 
@@ -79,7 +79,7 @@ def test_a_check_says_what_is_there_what_is_assumed_and_how_it_is_stated(robot: 
         (("run", "any.v2", "--robot", "ROBOT"), "any.v2"),
         (("console", "--robot", "ROBOT"), "an arm of 6 joints that turn"),
         (("lab", "--robot", "ROBOT", "--out", "."), "a mobile robot; this one is an arm"),
-        (("demo", "--robot", str(HUSKY), "--out", "."), "an arm; this one is a mobile robot"),
+        (("demo", "--robot", DIFF, "--out", "."), "an arm; this one is a mobile robot"),
         (("replay", "a.mcap", "--tip", "lamp"), "tip must be left out without --robot"),
     ],
 )
@@ -147,8 +147,8 @@ def test_its_physics_follows_in_either_world(robot: Path, tmp_path: Path, body: 
 
 def test_bases_drive_in_the_laboratory_and_their_recordings_play(tmp_path: Path) -> None:
     vrs(
-        "lab", "--robot", DIFF, "--robot", HUSKY, "--operator", "slalom", "--architecture", "timeline", "--runs", 1,
-        "--length", 6, "--workers", 1, "--record", "--out", tmp_path,
+        "lab", "--robot", DIFF, "--robot", bullet_data(HUSKY), "--operator", "slalom", "--architecture", "timeline",
+        "--runs", 1, "--length", 6, "--workers", 1, "--record", "--out", tmp_path,
     )  # fmt: skip
     recordings = sorted((tmp_path / "runs").glob("*.mcap"))
     assert len(recordings) == 2

@@ -62,4 +62,5 @@ def test_a_broken_pybullet_is_found(monkeypatch, code, stdout, found):
     stderr = "Traceback\nNo module named pybullet\n" if code == 1 else ""
     done = subprocess.CompletedProcess([sys.executable], code, stdout, stderr)
     monkeypatch.setattr(doctor.subprocess, "run", lambda *args, **kwargs: done)
+    monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: name)
     assert doctor.check_pybullet() == (False, found)

@@ -64,10 +64,15 @@ async def listening(robot: LiveRobot) -> AsyncIterator[str]:
         yield f"ws://127.0.0.1:{port}/site"
 
 
+WORLDS = {OperatorLoss.STOP: "bullet", OperatorLoss.CARRY_ON: "mujoco"}
+"""In which world of physics the robot drives."""
+
+
 @asynccontextmanager
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
-    config = PacedConfig(ROBOT, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
+    robot = ROBOT.with_body(WORLDS[loss])
+    config = PacedConfig(robot, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
     async with listening(LiveRobot(PacedBody(config), Access(free={Role.SITE}))) as url:
         at = sockets.bind("127.0.0.1", 0)
         own = at.getsockname()[1]
@@ -235,7 +240,7 @@ def test_an_operator_takes_no_other_robot_and_no_other_room(other: str) -> None:
 def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:
     wave = ".PROGRAM wave()\n    DRIVE 1, 5, 50\n.END\n"
     with (
-        doors.served("serve", "--robot", "ipr", "--port", "0", cwd=tmp_path) as serving,
+        doors.served("serve", "--robot", "ipr", "--body", "mujoco", "--port", "0", cwd=tmp_path) as serving,
         met(f"http://{serving.address}", "driver") as robot,
     ):
         controlled(robot)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import math
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from interfaces.runtime.plan import MAX_BYTES, MAX_COMMANDS, default_plan, parse_plan, read_plan
+from interfaces.runtime.plan import MAX_BYTES, MAX_COMMANDS, default_plan, parse_plan, read_plan, written_plan
 from robots import puma560
-from vrs import Insertion, JointTarget, PoseTarget, Profile
-from vrs.errors import FormatError
+from vrs import Engine, Insertion, JointTarget, ManualClock, Motion, MotionCommand, PoseTarget, Profile
+from vrs.commands import Grip
+from vrs.errors import FormatError, InvalidValueError
 
 model = puma560.model()
 MOVE = '{"issue": 1, "move": [10, 60, -170, 0, 30, 0]}'
@@ -45,6 +47,75 @@ def test_every_field_reaches_its_command():
     assert second.command.target == JointTarget(np.radians([10, 60, -170, 0, 30, 0]))
     assert (second.command.profile, second.command.insertion) == (Profile.JERK_LIMITED, Insertion.REPLACE)
     assert [(item.t, item.mass) for item in plan.payloads] == [(5, 2.5), (6, None)]
+    (passes,) = parse(
+        '{"issue": 1, "move": {"pose": "ready"}, "deviation_mm": 30, "pace": 0.5, "acceleration": 0.25, '
+        '"tool": {"xyz": [0, 0, 0.1], "zyz_deg": [90, 0, 0]}}'
+    ).motions
+    command = passes.command
+    assert (command.deviation, command.pace, command.acceleration) == (0.03, 0.5, 0.25)
+    assert command.tool == pytest.approx(np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0.1], [0, 0, 0, 1]]))
+    assert parse(MOVE.replace("}", ', "deviation_mm": "inf"}')).motions[0].command.deviation == math.inf
+
+
+def planned() -> tuple[Engine, np.ndarray]:
+    """An engine with much to do from 5 s on, and the tool of its lines."""
+    poses, engine = model.poses, Engine(model, q=model.poses["nominal"], clock=ManualClock(1.0))
+    tool = model.forward(poses["nominal"] + 0.4)
+    tool[:3, 3] = 0.0, 0.02, 0.1
+
+    def move(q, **how):
+        how.setdefault("insertion", Insertion.APPEND)
+        return engine.execute(MotionCommand(JointTarget(q), **how))
+
+    move(poses["ready"], execute_at=5.0, speed=0.5)
+    # Rounded with less of the limits: it's planned anew from the beginning of the one before.
+    move(poses["nominal"] + 0.2, deviation=0.1, speed=0.6)
+    move(poses["stretch"] * 0.6)
+    move(poses["nominal"] + 0.1, profile=Profile.JERK_LIMITED, deviation=math.inf)
+    by = move(poses["ready"], execute_at=20.0, speed=0.5)
+    engine.insert_via(by.command_id, JointTarget(poses["nominal"] + 0.3), deviation=0.05)
+    # On its way it's led elsewhere.
+    move(
+        poses["nominal"], execute_at=engine.receipt(by.command_id).end - 0.7, speed=0.5, insertion=Insertion.SPLICE
+    )
+    stops = move(poses["stretch"] * 0.7, execute_at=30.0, pace=0.5)
+    engine.insert_via(stops.command_id, JointTarget(poses["nominal"] + 0.15))
+    move(poses["nominal"] + 0.1)
+    X = model.forward(poses["nominal"] + 0.1)
+    X[2, 3] += 0.05
+    turn = np.eye(4)
+    turn[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
+    straight = engine.execute(MotionCommand(PoseTarget(X @ turn), execute_at=40.0, motion=Motion.LINE, tool=tool))
+    X[2, 3] -= 0.1
+    engine.insert_via(straight.command_id, PoseTarget(X), deviation=0.02)
+    engine.execute(Grip(0.0, execute_at=9.0))
+    engine.execute(Grip(math.inf, execute_at=12.0))
+    assert all(receipt.status != "rejected" for receipt in engine.receipts)
+    return engine, tool
+
+
+def test_what_is_planned_takes_the_same_path_from_a_file() -> None:
+    engine, tool = planned()
+    data = written_plan(engine, "Vias", {1: "up", 2: ""})
+    plan = parse_plan(data, "plan.jsonl", model)
+    again = Engine(model, q=plan.start, clock=ManualClock(0.0))
+    for motion in plan.motions:
+        assert again.execute(motion.command).status != "rejected"
+    shift = 5.0 - next(part.start for part in again.timeline.segments if part.command_id is not None)
+    assert again.timeline.end + shift == pytest.approx(engine.timeline.end, abs=1e-9)
+    t = np.arange(5.0, engine.timeline.end, 0.01)
+    assert again.joints(t - shift) == pytest.approx(engine.joints(t), abs=1e-9)
+    tools = [motion.command.tool for motion in plan.motions if isinstance(motion.command, MotionCommand)]
+    assert [found for found in tools if found is not None] == [pytest.approx(tool)] * 2
+    hand = np.array([8.999, 9.001, 11.999, 12.001])
+    assert again.opening(hand - shift).tolist() == engine.opening(hand).tolist() == [math.inf, 0, 0, math.inf]
+    assert data.splitlines()[1].endswith(b'"comment": "up"}')
+    # What has begun isn't to come any more, and after the end nothing is.
+    engine.clock.advance(20.0)
+    assert len(parse_plan(written_plan(engine, "Later", {}), "plan.jsonl", model).motions) < len(plan.motions)
+    engine.clock.advance(engine.timeline.end)
+    with pytest.raises(InvalidValueError, match="still to come"):
+        written_plan(engine, "Over", {})
 
 
 def test_a_pose_is_zyz_about_the_base():

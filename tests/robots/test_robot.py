@@ -12,6 +12,7 @@ import pytest
 
 import robots
 from robots.robot import EXACT, FOUND, IDEAL, Display, Gripper, HeadCamera, Robot, ThinClient
+from robots.simulated import WORLDS
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import MobileModel
 from vrs.model import RobotModel
@@ -26,7 +27,7 @@ def test_each_robot_is_found_by_its_name_and_stands_where_its_shapes_are_told(na
     assert robot.appearance is not None
     where = np.zeros(robot.arm.limits.dof if name in ARMS else 3)
     assert robot.appearance.poses(where).shape == (len(robot.appearance.shapes()), 4, 4)
-    assert next(iter(robot.bodies)) == "bullet"
+    assert next(iter(robot.bodies)) == (next(iter(WORLDS)) if name in ARMS else "bullet")
     assert isinstance(robot.model, RobotModel if name in ARMS else MobileModel)
 
 
@@ -70,7 +71,7 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     assert set(robot.with_body("mujoco").bodies) == set(robot.bodies)
     assert robot.body_name(EXACT) == robot.body_name(IDEAL) == IDEAL
     assert robot.body(EXACT) is robot.body(IDEAL)
-    with pytest.raises(InvalidValueError, match="one of bullet, bare"):
+    with pytest.raises(InvalidValueError, match="one of bullet, mujoco, bare"):
         robots.load("ipr").body(EXACT)
 
 

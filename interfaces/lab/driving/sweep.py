@@ -17,6 +17,7 @@ from interfaces.runs.summary import Attribution
 from interfaces.teleop.architectures import Transport, architecture
 from robots.mobile.chassis import MobileReality
 from robots.mobile.robot import place
+from robots.robot import BARE
 from vrs.comparison import PathComparison
 
 LEAST_PROGRESS = 0.97
@@ -151,7 +152,7 @@ def attributed(case: DriveCase, whole: PathComparison | None = None) -> tuple[At
 
 def _variants(case: DriveCase) -> list[DriveCase]:
     prompt = replace(case, delay="none")
-    step = 1 / 60 if case.robot == "bare" else 1 / 240
+    step = 1 / 60 if case.real[1] == BARE else 1 / 240
     alike = replace(prompt, reality=MobileReality.ideal(dt=step))
     placed = replace(alike, position="truth")
     if not architecture(case.architecture).senses:

@@ -24,11 +24,11 @@ from interfaces.lab.statistics import bootstrap
 from interfaces.messages.jobs import JobList, JobStage, ListCommand, MessageJob, MoveJob, VoiceJob, WaitJob
 from robots.bullet.rooms import Person, Room
 from robots.ipr.parameters import IPR
-from robots.mobile.body import Cargo
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import place
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
+from robots.vehicle import Cargo
 from vrs.mobile import wrapped
 
 if TYPE_CHECKING:

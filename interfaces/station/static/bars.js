@@ -103,3 +103,16 @@ export function Marks({ strip }) {
     ${station.happenings.events.filter(({ t }) => t >= from && t <= until).map(({ t, symbol, text, tone }) =>
       html`<i class="event" key=${t + text} style=${left(t)} title=${`${clockText(t)} ${text}`} data-tone=${tone}><${Icon} name=${symbol} /></i>`)}</div>`;
 }
+
+/** What the hand was told, and is told yet. */
+export function Grips({ strip }) {
+  const { view, moves, session } = strip;
+  if (!moves || !view.drawn) return null;
+  const [from, until] = view.drawn;
+  const told = [...session.reader.names.values()].flat().filter(({ kind, t }) => kind === "grip" && t >= from && t <= until);
+  return told.map(({ command_id: id, t, label }) => {
+    const words = `#${id} ${label || "hand"}, ${clockText(t)}`;
+    return html`<i class="event grip" key=${id} role="img" style=${`left: ${view.left(t).toFixed(1)}px`} title=${words} aria-label=${words}>
+      <${Icon} name="gripper" />${label.split(" ")[0]}</i>`;
+  });
+}

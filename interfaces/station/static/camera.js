@@ -1,11 +1,10 @@
 // What the robot sees, says and shows: its camera's picture and sound by RTP, or single pictures, and both its axes.
 import { Gaze } from "./gaze.js";
-import { DEGREES, draw, h, icon, mark, planted, write } from "./dom.js";
 import { Held, Needs } from "./handling.js";
 import { Receiver } from "./receiver.js";
 import { sideLink } from "./sidelink.js";
 import { Stills } from "./stills.js";
-import { html, Icon } from "./ui.js";
+import { barred, DEGREES, figure, html, Icon, observed, useEffect, useEvery, useMemo, useRef, useState } from "./ui.js";
 
 const PERIOD = 250;
 const LONGEST = 300;
@@ -18,148 +17,168 @@ const BUTTONS = [
   null, ["Look down", "keyboard_arrow_down", [0, -1]], null,
 ];
 
-export function mount(station, box) {
-  document.head.append(h("link", { rel: "stylesheet", href: "/station/camera.css" }));
-  const { session } = station;
-  /** What the server says of camera, voice and screen; null before. */
-  let facts = null;
-  /** Whether RTP is of no use here, and single pictures are shown. */
-  let single = false;
 
-  const video = h("video", { id: "camera-video", playsinline: true, autoplay: true, "aria-label": "What the robot's camera sees" });
-  video.muted = true;
-  const still = h("img", { id: "camera-still", alt: "What the robot's camera sees", hidden: true, draggable: "false" });
-  const caption = h("p.caption", { id: "camera-saying", role: "status", hidden: true });
-  const wait = h("p.waiting", { id: "camera-wait" }, "Waiting for the camera");
-  const stage = h("div.stage", { id: "camera-stage" }, video, still, wait, caption);
-  const rate = h("span.rate", { id: "camera-rate", title: "Pictures a second that arrive" });
-  const angles = h("span.muted", { id: "camera-angles" });
-  const sound = h("button.small", { type: "button", id: "camera-sound", "aria-pressed": "false", onclick: listen },
-    icon("volume_off"), h("span", {}, "Sound on"));
-  const problem = h("p.advice", { id: "camera-problem", role: "status", hidden: true });
-  const said = h("p.refused", { id: "camera-refused", hidden: true });
-
-  const link = sideLink(station, "/media", { take: (data) => take(JSON.parse(data)), state: connected });
-  const receiver = new Receiver(video, (message) => link.send(JSON.stringify(message)), fallBack);
-  const stills = new Stills(still, session);
-  const gaze = new Gaze(session, () => facts, (message) => link.send(JSON.stringify(message)), refuse);
-
-  const cross = h("div.cross", { role: "group", "aria-label": "Turn the camera" }, ...BUTTONS.map((entry) => entry ? button(...entry) : h("span")));
-  const text = h("input", { id: "camera-text", maxlength: LONGEST, autocomplete: "off", "aria-label": "Words to say or to show", placeholder: "Words to say or to show" });
-  const say = h("button.small", { type: "button", id: "camera-say", onclick: () => utter("speak") }, "Say");
-  const show = h("button.small", { type: "button", id: "camera-show", onclick: () => utter("show") }, "Show");
-  const clear = h("button.small", { type: "button", id: "camera-clear", onclick: () => utter("clear") }, "Clear");
-  const message = h("p.message", { id: "camera-message" });
-  const words = h("div.row", {}, text, say, show, clear);
-  box.append(stage, h("div.row", {}, rate, angles, h("span.grow"), sound), problem,
-    planted(html`<${Needs} station=${station} id="camera-needs" />`),
-    h("div.drive-by", {}, cross, h("p.hint", {}, "Drag the picture, hold a button, or the keys J L I K; C looks ahead.")),
-    words, said, h("h2", {}, "On its screen"), message);
-  const toast = h("div.robot-screen", { id: "robot-screen", role: "status", hidden: true });
-  document.getElementById("pane-box").append(toast);
-
-  function button(label, symbol, way) {
-    const props = { "aria-label": label, title: label };
-    if (way) return planted(html`<${Held} steer=${gaze} source="button" ...${props} input=${() => way}><${Icon} name=${symbol} /><//>`);
-    return h("button.held", { type: "button", ...props, onclick: () => gaze.ahead() }, icon(symbol));
+/** What is known of the camera, and what brings its picture. */
+class Camera {
+  constructor(station) {
+    this.station = station;
+    observed(this, {
+      /** What the server says of camera, voice and screen; null before. */
+      facts: null,
+      /** Whether RTP is of no use here, and why not. */
+      single: false,
+      why: "",
+      refused: "",
+      muted: true,
+      /** Whether the picture comes by RTP. */
+      byRtp: false,
+    });
+    this.gaze = new Gaze(station.session, () => this.facts, (message) => this.send(message), (why) => this.refuse(why));
   }
 
-  function refuse(why) {
-    said.hidden = !why;
-    write(said, why);
-    station.refuse(why);
+  /** Begin once there's where to show it. */
+  begin(video, image) {
+    this.video = video;
+    video.muted = true;
+    this.link = sideLink(this.station, "/media", { take: (data) => this.take(JSON.parse(data)), state: (state) => this.connected(state) });
+    this.receiver = new Receiver(video, (message) => this.send(message), (why) => this.fallBack(why));
+    this.stills = new Stills(image, this.station.session);
   }
 
-  function utter(what) {
-    const given = text.value.trim();
-    if (what !== "clear" && !given) return refuse("There are no words to say or to show.");
-    if (!session.holds) return refuse("Take control first: who has control speaks.");
-    refuse("");
-    const wish = { do: what, session: session.key, epoch: String(session.epoch) };
-    if (what !== "clear") wish.text = given;
-    if (!link.send(JSON.stringify(wish))) refuse("There's no connection: nothing was sent.");
+  send(message) {
+    return this.link.send(JSON.stringify(message));
   }
 
-  text.addEventListener("keydown", (event) => event.key === "Enter" && utter("speak"));
-
-  function listen() {
-    video.muted = !video.muted;
-    mark(sound, "aria-pressed", String(!video.muted));
-    draw(sound.firstChild, video.muted ? "volume_off" : "volume_up");
-    write(sound.lastChild, video.muted ? "Sound on" : "Sound off");
-    look();
+  refuse(why) {
+    this.refused = why;
+    this.station.refuse(why);
   }
 
   /** RTP doesn't come: single pictures do. */
-  function fallBack(why) {
-    single = true;
-    if (why) write(problem, why);
-    look();
+  fallBack(why) {
+    this.single = true;
+    this.why = why ?? "";
+    this.look();
   }
 
-  function take(news) {
-    if (news.kind === "answer") receiver.answer(news.sdp);
+  take(news) {
+    if (news.kind === "answer") this.receiver.answer(news.sdp);
+    else if (news.kind === "media") this.facts = news;
     else if (news.kind === "problem") {
-      if (receiver.waits) receiver.fail(news.text);
-      else refuse(news.text);
-    } else if (news.kind === "media") {
-      facts = news;
-      look();
-      tell();
+      if (this.receiver.waits) this.receiver.fail(news.text);
+      else this.refuse(news.text);
     }
+    this.look();
   }
 
-  function connected(state) {
+  connected(state) {
     if (state === "live") {
-      single = false;
-      receiver.stop();
+      this.single = false;
+      this.receiver?.stop();
     }
-    look();
+    if (this.receiver) this.look();
   }
-
-  const isShown = () => box.offsetParent !== null && document.visibilityState === "visible";
 
   /** Watch by RTP, by single pictures, or not at all, as it's of use now. */
-  function look() {
-    const able = link.state === "live" && facts !== null;
-    const byRtp = able && facts.video && !single && window.RTCPeerConnection !== undefined;
-    receiver.want(byRtp && (isShown() || !video.muted));
-    stills.want(able && !byRtp && isShown());
-    video.hidden = !byRtp;
-    still.hidden = byRtp;
-    sound.hidden = !byRtp;
+  look() {
+    const shown = this.video.parentElement.offsetParent !== null && document.visibilityState === "visible";
+    const able = this.link.state === "live" && this.facts !== null;
+    this.byRtp = Boolean(able && this.facts.video && !this.single && window.RTCPeerConnection !== undefined);
+    this.receiver.want(this.byRtp && (shown || !this.video.muted));
+    this.stills.want(able && !this.byRtp && shown);
   }
 
-  function tell() {
-    if (!facts) return;
-    const { message: shown, saying } = facts;
-    toast.hidden = !shown;
-    write(toast, shown);
-    write(message, shown || "Nothing");
-    caption.hidden = !saying;
-    write(caption, saying ? `“${saying}”` : "");
-    const missing = facts.missing ? `Single pictures only: ${facts.missing} isn't installed where the server runs (the extra media).` : "";
-    const why = facts.problem || (facts.video && facts.voice) || missing || (single && problem.textContent) || "";
-    write(problem, why);
-    problem.hidden = !why;
-    clear.disabled = !shown || !session.holds;
-    say.disabled = show.disabled = !session.holds;
-    if (box.offsetParent === null) return;
-    const per = receiver.wanted ? receiver.rate : stills.rate;
-    write(rate, per ? `${per.toFixed(1)} pictures/s` : "no picture");
-    wait.hidden = per > 0 || (receiver.wanted ? receiver.frames : stills.frames) > 0;
-    const side = facts.pan >= 0 ? "left" : "right";
-    write(angles, `${Math.abs(facts.pan * DEGREES).toFixed(0)}° ${side}, ${Math.abs(facts.tilt * DEGREES).toFixed(0)}° ${facts.tilt >= 0 ? "up" : "down"}`);
+  listen() {
+    this.muted = this.video.muted = !this.video.muted;
+    this.look();
   }
 
-  gaze.drag(stage);
-  gaze.keys(KEYS, "KeyC", () => box.offsetParent !== null);
-  new IntersectionObserver(look).observe(box);
-  document.addEventListener("visibilitychange", look);
-  setInterval(() => {
-    look();
-    tell();
-  }, PERIOD);
-  station.on("lease", tell);
-  station.shared.camera = { video, receiver, stills, get facts() { return facts; } };
+  /** Say words aloud, show them, or clear what is shown. */
+  utter(what, text) {
+    const { session, idle } = this.station;
+    const wrong = idle || (what !== "clear" && !text ? "There are no words to say or to show." : "");
+    this.refuse(wrong);
+    if (wrong) return;
+    const wish = { do: what, session: session.key, epoch: String(session.epoch), ...(what === "clear" ? {} : { text }) };
+    if (!this.send(wish)) this.refuse("There's no connection: nothing was sent.");
+  }
+
+  /** What stands in the way of picture and sound. */
+  get problem() {
+    const { facts } = this;
+    if (!facts || facts.problem || (facts.video && facts.voice)) return facts?.problem || (this.single ? this.why : "");
+    return facts.missing ? `Single pictures only: ${facts.missing} isn't installed where the server runs (the extra media).`
+      : this.single ? this.why : "";
+  }
+}
+
+export function Panel({ station }) {
+  const camera = useMemo(() => (station.camera = new Camera(station)), []);
+  const { facts } = camera;
+  const why = station.idle;
+  const words = useRef(null);
+  const utter = (what) => camera.utter(what, words.current.value.trim());
+  const message = facts?.message;
+  const speak = (id, what, text, off) => html`<button class="small" type="button" id=${id} ...${barred(off)}
+    onClick=${() => utter(what)}>${text}</button>`;
+  return html`<link rel="stylesheet" href="/station/camera.css" />
+    <${Stage} station=${station} camera=${camera} />
+    <p class="advice" id="camera-problem" role="status" hidden=${!camera.problem}>${camera.problem}</p>
+    <${Needs} station=${station} id="camera-needs" />
+    <div class="drive-by"><div class="cross" role="group" aria-label="Turn the camera">
+      ${BUTTONS.map((entry) => (entry ? html`<${Turn} camera=${camera} entry=${entry} why=${why} />` : html`<span></span>`))}</div>
+      <p class="hint">Drag the picture, hold a button, or the keys J L I K; C looks ahead.</p></div>
+    <div class="row"><input id="camera-text" ref=${words} maxlength=${LONGEST} autocomplete="off" aria-label="Words to say or to show"
+        placeholder="Words to say or to show" onKeyDown=${(event) => event.key === "Enter" && utter("speak")} />
+      ${speak("camera-say", "speak", "Say", why)}${speak("camera-show", "show", "Show", why)}
+      ${speak("camera-clear", "clear", "Clear", why || (message ? "" : "Nothing is shown."))}</div>
+    <p class="refused" id="camera-refused">${camera.refused}</p>
+    <h2>On its screen</h2><p class="message" id="camera-message">${message || "Nothing"}</p>`;
+}
+
+function Turn({ camera, entry: [label, symbol, way], why }) {
+  const icon = html`<${Icon} name=${symbol} />`;
+  if (!way) return html`<button class="held" type="button" aria-label=${label} ...${barred(why, label)} onClick=${() => camera.gaze.ahead()}>${icon}</button>`;
+  return html`<${Held} steer=${camera.gaze} source="button" aria-label=${label} title=${label} why=${why} input=${() => way}>${icon}<//>`;
+}
+
+/** The picture, how it comes, and where the camera looks. */
+function Stage({ station, camera }) {
+  const [stage, video, image] = [useRef(null), useRef(null), useRef(null)];
+  const [rate, setRate] = useState([0, 0]);
+  const { facts, byRtp, muted } = camera;
+  useEffect(() => {
+    camera.begin(video.current, image.current);
+    camera.gaze.drag(stage.current);
+    camera.gaze.keys(KEYS, "KeyC", () => stage.current.offsetParent !== null);
+    const look = () => camera.look();
+    const seen = new IntersectionObserver(look);
+    seen.observe(stage.current);
+    document.addEventListener("visibilitychange", look);
+    return () => (seen.disconnect(), document.removeEventListener("visibilitychange", look));
+  }, []);
+  useEvery(PERIOD, () => {
+    camera.look();
+    const source = camera.receiver.wanted ? camera.receiver : camera.stills;
+    if (stage.current.offsetParent !== null) setRate([source.rate, source.frames]);
+  });
+  const [per, frames] = rate;
+  const side = (x, more, less) => `${figure(Math.abs(x * DEGREES), 0)}° ${x >= 0 ? more : less}`;
+  return html`<div class="stage" id="camera-stage" ref=${stage}>
+      <video id="camera-video" ref=${video} playsinline autoplay hidden=${!byRtp} aria-label="What the robot's camera sees" />
+      <img id="camera-still" ref=${image} alt="What the robot's camera sees" hidden=${byRtp} draggable=${false} />
+      <p class="waiting" id="camera-wait" hidden=${per > 0 || frames > 0}>Waiting for the camera</p>
+      <p class="caption" id="camera-saying" role="status" hidden=${!facts?.saying}>${facts?.saying ? `“${facts.saying}”` : ""}</p></div>
+    <div class="row of-picture"><span class="rate" id="camera-rate" title="Pictures a second that arrive">
+        ${per ? `${figure(per, 1)} pictures/s` : "no picture"}</span>
+      <span class="muted" id="camera-angles">${facts && `${side(facts.pan, "left", "right")}, ${side(facts.tilt, "up", "down")}`}</span>
+      <span class="grow"></span>
+      <button class="small" type="button" id="camera-sound" aria-pressed=${String(!muted)} hidden=${!byRtp} onClick=${() => camera.listen()}>
+        <${Icon} name=${muted ? "volume_off" : "volume_up"} /><span>${muted ? "Sound on" : "Sound off"}</span></button></div>`;
+}
+
+/** What the robot's screen shows, over the 3D view. */
+export function Screen({ station }) {
+  const shown = station.camera?.facts?.message;
+  return html`<div class="robot-screen" id="robot-screen" role="status" hidden=${!shown}>${shown ?? ""}</div>`;
 }

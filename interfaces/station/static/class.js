@@ -8,36 +8,30 @@ const DOES = { viewer: "watch", operator: "operate" };
 export function Panel({ station }) {
   const { session } = station;
   const teaches = session.welcome?.role === "admin";
-  return html`${teaches && html`<${Invitations} token=${session.token} />`}<${Present} session=${session} teaches=${teaches} />`;
+  return html`${teaches && html`<${Invitations} session=${session} />`}<${Present} session=${session} teaches=${teaches} />`;
 }
 
 /** The codes in force, and their links as pictures. */
-function Invitations({ token }) {
+function Invitations({ session }) {
   const [shown, setShown] = useState([]);
   const [tries, setTries] = useState(0);
   useEffect(() => {
     let timer = null;
     const again = (wait) => (timer = setTimeout(() => setTries(tries + 1), wait));
     const load = async () => {
-      const { invitations } = await (await asked("", token)).json();
-      const pictures = await Promise.all(invitations.map(async ({ role }) => (await asked(`/${role}.svg`, token)).blob()));
+      const { invitations } = await session.ask("/class");
+      const pictures = await Promise.all(invitations.map(async ({ role }) => (await session.fetch(`/class/${role}.svg`)).blob()));
       setShown(invitations.map((one, k) => ({ ...one, picture: URL.createObjectURL(pictures[k]) })));
       again(1000 * Math.min(...invitations.map((one) => one.expires_in)) + AFTER);
     };
     load().catch(() => again(2000));
     return () => clearTimeout(timer);
-  }, [tries, token]);
+  }, [tries, session.token]);
   useEffect(() => () => shown.forEach(({ picture }) => URL.revokeObjectURL(picture)), [shown]);
   return html`<section><div class="head"><h2>Join</h2><span class="hint">codes change every ten minutes</span></div>
     <div class="invitations">${shown.map(({ role, code, link, picture }) => html`<figure key=${role} id=${`join-${role}`}>
       <img src=${picture} alt=${`QR code of ${link}`} width="132" height="132" />
       <figcaption>To ${DOES[role]}<strong class="code">${code}</strong><a href=${link}>${link}</a></figcaption></figure>`)}</div></section>`;
-}
-
-async function asked(path, token) {
-  const answer = await fetch(`${window.VrsLink.FOLDER}/class${path}`, { headers: { Authorization: `Bearer ${token}` } });
-  if (!answer.ok) throw new Error(answer.statusText);
-  return answer;
 }
 
 function Present({ session, teaches }) {

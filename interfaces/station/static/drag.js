@@ -36,8 +36,7 @@ function follow(station, handle, goal) {
 
   function project(point) {
     const at = seen(point).project(scene.viewer.camera);
-    const box = pane.getBoundingClientRect();
-    return { x: ((at.x + 1) / 2) * box.width, y: ((1 - at.y) / 2) * box.height, behind: at.z > 1 };
+    return { x: ((at.x + 1) / 2) * scene.width, y: ((1 - at.y) / 2) * scene.height, behind: at.z > 1 };
   }
 
   /** Where the pointer's ray meets the plane through the tool that faces the camera. */

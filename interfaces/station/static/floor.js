@@ -1,4 +1,5 @@
 // The 3D view of a mobile robot: both twins in their room, where they drove, what is committed, and how old that is.
+import { Screen } from "./camera.js";
 import { busy } from "./tasks.js";
 import { StationScene } from "./twins.js";
 import { html } from "./ui.js";
@@ -11,10 +12,10 @@ const LEGEND = [
   ["driven", "Driven", "where both were"],
 ];
 
-/** A robot in its room: the server says how far away all of that is seen. */
+/** A robot in its room: the server says how far away all of that is seen; upright, a phone needs a little more. */
 class FloorScene extends StationScene {
   get further() {
-    return 1.0;
+    return 1.08;
   }
 }
 
@@ -37,5 +38,6 @@ export function Panel({ station }) {
     return { symbol, words, status };
   }
 
-  return html`<${Viewport} station=${station} Scene=${FloorScene} legend=${LEGEND} standing=${standing} />`;
+  return html`<${Viewport} station=${station} Scene=${FloorScene} legend=${LEGEND} standing=${standing} />
+    <${Screen} station=${station} />`;
 }

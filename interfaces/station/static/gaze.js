@@ -1,5 +1,5 @@
 // Turning the robot's camera: by buttons that are held, by keys, and by dragging its picture. Who has control may.
-import { isTyping } from "./dom.js";
+import { isTyping } from "./ui.js";
 
 /** Time between two messages [ms], and how fast a button or key turns the camera [rad/s]. */
 const PERIOD = 100;

@@ -1,8 +1,7 @@
 // The list of jobs: edited, reordered, kept by the server, tried on the virtual robot, and done.
-import { DEGREES, h, icon, isTyping, mark, planted, write } from "./dom.js";
 import { Needs } from "./handling.js";
 import { ask, goalText } from "./tasks.js";
-import { html } from "./ui.js";
+import { barred, Choice, DEGREES, html, Icon, isTyping, useOn, useRef, useState } from "./ui.js";
 
 /** Kinds of jobs: name, what is written, and how a job is read from its fields. */
 const KINDS = {
@@ -20,6 +19,7 @@ const STAGES = {
   failed: ["error", "Failed"],
   aborted: ["cancel", "Aborted"],
 };
+/** What a list is asked, its symbol and its name. */
 const COMMANDS = [
   ["dry-run", "science", "Dry run"], ["run", "play_arrow", "Run"], ["pause", "pause", "Pause"],
   ["resume", "redo", "Resume"], ["abort", "stop_circle", "Abort"], ["key", "keyboard_return", "Key"],
@@ -75,157 +75,160 @@ function outlook(forecast) {
   return duration(total) + (forecast.some((one) => one.lasts == null) ? " and what nobody knows" : "");
 }
 
-export function mount(station, box) {
-  const { session } = station;
-  const list = h("ol.jobs", { id: "jobs" });
-  const empty = h("p.muted", { id: "jobs-empty" }, "No jobs yet. Add the first one below.");
-  const fault = h("p.refused", { id: "jobs-fault" });
-  const stage = h("p.journey", { id: "jobs-stage", role: "status" });
-  const screen = h("p.screen", { id: "jobs-shows", hidden: true });
-  const policy = h("p.muted", { id: "jobs-policy" });
-  const buttons = {};
-  const bar = h("div.job-bar", { role: "group", "aria-label": "The list" }, ...COMMANDS.map(([word, symbol, title]) => {
-    buttons[word] = h("button", { type: "button", id: `jobs-${word}`, onclick: () => command(word) }, icon(symbol), title);
-    return buttons[word];
-  }));
-  const kind = h("select", { id: "job-kind", "aria-label": "Kind of job" },
-    ...Object.entries(KINDS).map(([value, { name }]) => h("option", { value }, name)));
-  const text = h("input", { id: "job-text", "aria-label": "Of the new job", autocomplete: "off", maxlength: 400 });
-  const program = h("textarea", { id: "job-source", rows: 5, hidden: true, spellcheck: "false", maxlength: 16000,
-    "aria-label": "VAL-II file of the program", placeholder: ".PROGRAM pick\n…\n.END" });
-  const adding = h("form.job-add", { id: "job-add" }, kind, text, h("button.main", { id: "job-add-it" }, "Add"), program);
-  const placeName = h("input", { id: "place-name", "aria-label": "Name of a place", placeholder: "name", maxlength: 40, autocomplete: "off" });
-  const keeping = h("form.job-add", { id: "place-add" }, h("span.muted", {}, "Here is"), placeName, h("button", {}, "Keep place"));
-  box.append(planted(html`<${Needs} station=${station} id="jobs-needs" />`), bar, stage, screen, fault, list, empty, adding, keeping, policy);
+const NONE = { jobs: [], places: {} };
 
-  /** The list as it was edited here, until the server has answered the last edit; edits come faster than answers. */
-  let draft = null;
-  let edits = 0;
-  const listed = () => draft ?? session.tasks?.jobs ?? { jobs: [], places: {} };
-  const jobs = () => listed().jobs;
-  const places = () => listed().places;
-  const say = (words) => {
-    write(fault, words);
-    station.refuse(words);
-  };
-  const command = (word) => ask(station, { do: word }, say);
-  function send(entries, named = places()) {
-    draft = { jobs: entries, places: named };
-    edits += 1;
-    const mine = edits;
-    ask(station, { jobs: draft }, (words) => {
-      // One that was refused takes those that were made on top of it along.
-      if (words || mine === edits) settle();
-      say(words);
-    });
-    show();
-  }
-  function settle() {
-    draft = null;
-    show();
-  }
-  const number = () => 1 + Math.max(0, ...jobs().map((job) => job.number));
-
-  function hint() {
-    text.placeholder = KINDS[kind.value].hint;
-    program.hidden = kind.value !== "arm";
-  }
-  kind.addEventListener("change", hint);
-  hint();
-
-  adding.addEventListener("submit", (event) => {
-    event.preventDefault();
-    const job = read(kind.value, text.value, number(), places(), program.value);
-    if (typeof job === "string") return say(job);
-    text.value = program.value = "";
-    return send([...jobs(), job]);
-  });
-  keeping.addEventListener("submit", (event) => {
-    event.preventDefault();
-    const real = session.state?.real;
-    const name = placeName.value.trim();
-    if (!real || !name) return say(real ? "Give the place a name first." : "Nobody knows where the robot is.");
-    placeName.value = "";
-    const round = (value) => Math.round(value * 1000) / 1000;
-    return send(jobs(), { ...places(), [name]: { x: round(real[0]), y: round(real[1]), heading: round(real[2]) } });
-  });
-
-  function change(job, field) {
-    const found = read(job.do, field.value, number(), places(), job.source);
-    if (typeof found === "string") {
-      field.value = written(job);
-      say(found);
-    } else if (field.value !== written(job)) send(jobs().map((other) => (other.number === job.number ? found : other)));
-  }
-
-  function move(job, by) {
-    const entries = jobs().filter((other) => other.number !== job.number);
-    entries.splice(jobs().findIndex((other) => other.number === job.number) + by, 0, job);
-    send(entries);
-  }
-
-  function row(job, at, all, progress, forecast, running) {
-    const [symbol, word] = STAGES[progress?.stage ?? "planned"];
-    const field = h("input.what", { value: written(job), "aria-label": `${KINDS[job.do].name} ${at + 1}`, disabled: running,
-      title: job.do === "move" && places()[job.to] ? goalText(places()[job.to]) : null, maxlength: 400, autocomplete: "off" });
-    field.addEventListener("change", () => change(job, field));
-    const tool = (label, name, does, off) => h("button.quiet", { type: "button", "aria-label": `${label} job ${at + 1}`,
-      title: label, disabled: running || off, onclick: does }, icon(name));
-    const mine = forecast?.find((one) => one.number === job.number);
-    const lasts = mine?.problem ? mine.problem : mine ? duration(mine.lasts) : "";
-    const note = [progress?.reason, lasts].filter(Boolean).join(" · ");
-    return h("li.job", { "data-stage": progress?.stage ?? "planned", "data-number": job.number },
-      h("span.stage", { title: word }, icon(symbol), h("span.spoken", {}, word)),
-      h("span.kind", {}, KINDS[job.do].name), field,
-      h("span.tools-job", {}, tool("Earlier", "arrow_upward", () => move(job, -1), at === 0),
-        tool("Later", "arrow_downward", () => move(job, 1), at === all.length - 1),
-        tool("Remove", "delete", () => send(jobs().filter((other) => other.number !== job.number)), false)),
-      note ? h("span.note", { "data-bad": mine?.problem ? true : null }, note) : null);
-  }
-
-  let shown = "";
-  function show() {
-    const tasks = session.tasks;
-    if (!tasks) return;
-    const { progress, forecast } = tasks;
-    const stageNow = progress.stage;
-    const running = stageNow === "running";
-    const ready = session.holds && session.link === "live";
-    const text = JSON.stringify([listed(), progress, forecast, ready]);
-    if (text !== shown) {
-      shown = text;
-      const by = new Map(progress.jobs.map((one) => [one.number, one]));
-      const focus = document.activeElement?.closest?.("#jobs") && document.activeElement.getAttribute("aria-label");
-      list.replaceChildren(...jobs().map((job, at, all) => row(job, at, all, by.get(job.number), forecast, running)));
-      if (focus) list.querySelector(`[aria-label="${CSS.escape(focus)}"]`)?.focus();
-    }
-    empty.hidden = jobs().length > 0;
-    list.hidden = jobs().length === 0;
-    const waits = running && jobs().some((job) => job.do === "wait" && job.seconds == null
+/** Why a list can't be asked something now; "" where it can. */
+function hindrance(word, { jobs }, progress) {
+  const { stage } = progress;
+  const running = stage === "running";
+  if (word === "key") {
+    const waits = jobs.some((job) => job.do === "wait" && job.seconds == null
       && progress.jobs.some((one) => one.number === job.number && one.stage === "running"));
-    const many = jobs().length > 0;
-    const can = { "dry-run": many, run: many && !running, pause: running, abort: running || stageNow === "paused",
-      resume: many && ["paused", "failed", "aborted"].includes(stageNow), key: waits };
-    for (const [word, button] of Object.entries(buttons)) button.disabled = !(ready && can[word]);
-    mark(buttons.key, "data-waits", waits);
-    const predicted = forecast ? ` Dry run: ${outlook(forecast)}.` : "";
-    const says = tasks.says ? ` Says: “${tasks.says}”` : "";
-    write(stage, `${STAGES[stageNow][1]}${progress.reason ? ": " + progress.reason : ""}.${predicted}${says}`);
-    stage.dataset.state = stageNow;
-    write(screen, tasks.shows);
-    screen.hidden = !tasks.shows;
-    write(policy, [LOSSES[tasks.loss] ?? "", tasks.problem].filter(Boolean).join(" "));
-    mark(policy, "data-bad", tasks.problem ? true : null);
+    return running && waits ? "" : "No job waits for the key.";
   }
+  if (word === "pause") return running ? "" : "The list isn't running.";
+  if (word === "abort") return running || stage === "paused" ? "" : "The list isn't running.";
+  if (jobs.length === 0) return "There are no jobs yet.";
+  if (word === "resume") return ["paused", "failed", "aborted"].includes(stage) ? "" : "The list isn't paused.";
+  return word === "run" && running ? "The list is running." : "";
+}
 
-  // The key of a WAIT is Enter, as in the paper, where it means nothing else.
-  window.addEventListener("keydown", (event) => {
-    if (event.key !== "Enter" || event.repeat || isTyping(event) || buttons.key.disabled) return;
+export function Panel({ station }) {
+  const { session } = station;
+  const { tasks, link } = session;
+  /** The list as it was edited here, until the server has answered the last edit; edits come faster than answers. */
+  const [draft, setDraft] = useState(null);
+  const edits = useRef(0);
+  const newest = useRef(null);
+  const [fault, setFault] = useState("");
+  useOn(session, "link", (to) => to === "lost" && setList(null));
+  useOn(window, "keydown", (event) => {
+    // The key of a WAIT is Enter, as in the paper, where it means nothing else.
+    if (event.key !== "Enter" || event.repeat || isTyping(event) || !session.tasks || whyNot("key")) return;
     if (event.target.closest?.("button, select, a, summary, dialog, [role=tab], [role=separator]")) return;
     event.preventDefault();
     command("key");
   });
-  for (const type of ["tasks", "lease", "link", "welcome"]) station.on(type, show);
-  station.on("link", (link) => link === "lost" && settle());
-  show();
+
+  function setList(list) {
+    newest.current = list;
+    setDraft(list);
+  }
+
+  function say(words) {
+    setFault(words);
+    station.refuse(words);
+  }
+
+  const list = () => newest.current ?? session.tasks?.jobs ?? NONE;
+  const whyNot = (word) => station.idle || hindrance(word, list(), session.tasks.progress);
+  const command = (word) => (whyNot(word) ? say(whyNot(word)) : ask(station, { do: word }, setFault));
+
+  function send(change) {
+    setList({ ...list(), ...change });
+    const mine = ++edits.current;
+    ask(station, { jobs: newest.current }, (words) => {
+      // One that was refused takes those that were made on top of it along.
+      if (words || mine === edits.current) setList(null);
+      setFault(words);
+    });
+  }
+
+  if (!tasks) return html`<${Needs} station=${station} id="jobs-needs" />`;
+  const { progress, forecast } = tasks;
+  const { jobs, places } = draft ?? tasks.jobs;
+  const stage = progress.stage;
+  const number = 1 + Math.max(0, ...jobs.map((job) => job.number));
+  const why = station.idle || (stage === "running" ? "The list is running: pause or abort it first." : "");
+  const predicted = forecast ? ` Dry run: ${outlook(forecast)}.` : "";
+  const says = tasks.says ? ` Says: “${tasks.says}”` : "";
+  return html`<link rel="stylesheet" href="/station/tasks.css" />
+    <${Needs} station=${station} id="jobs-needs" />
+    <div class="job-bar" role="group" aria-label="The list">${COMMANDS.map(([word, symbol, title]) =>
+      html`<button type="button" id=${`jobs-${word}`} ...${barred(whyNot(word), title)} onClick=${() => command(word)}
+        data-waits=${word === "key" && !whyNot("key") ? "" : undefined}><${Icon} name=${symbol} />${title}</button>`)}</div>
+    <p class="journey" id="jobs-stage" role="status" data-state=${stage}>
+      ${`${STAGES[stage][1]}${progress.reason ? ": " + progress.reason : ""}.${predicted}${says}`}</p>
+    <p class="screen" id="jobs-shows" hidden=${!tasks.shows}>${tasks.shows}</p>
+    <p class="refused" id="jobs-fault">${fault}</p>
+    <ol class="jobs" id="jobs" hidden=${jobs.length === 0}>${jobs.map((job, at) => html`<${Row} key=${job.number} job=${job} at=${at}
+      jobs=${jobs} places=${places} why=${why} send=${send} say=${say} progress=${progress.jobs.find((one) => one.number === job.number)}
+      forecast=${forecast?.find((one) => one.number === job.number)} />`)}</ol>
+    <p class="muted" id="jobs-empty" hidden=${jobs.length > 0}>No jobs yet. Add the first one below.</p>
+    <${NewJob} why=${why} places=${places} number=${number} say=${say} add=${(job) => send({ jobs: [...list().jobs, job] })} />
+    <${NewPlace} session=${session} why=${why} say=${say} add=${(place) => send({ places: { ...list().places, ...place } })} />
+    <p class="muted" id="jobs-policy" data-bad=${tasks.problem ? "" : undefined}>
+      ${[LOSSES[tasks.loss] ?? "", tasks.problem].filter(Boolean).join(" ")}</p>`;
+}
+
+function Row({ job, at, jobs, places, why, send, say, progress, forecast }) {
+  const stage = progress?.stage ?? "planned";
+  const [symbol, word] = STAGES[stage];
+  const kind = KINDS[job.do].name;
+  const others = jobs.filter((other) => other !== job);
+  const lasts = forecast ? forecast.problem || duration(forecast.lasts) : "";
+  const note = [progress?.reason, lasts].filter(Boolean).join(" · ");
+
+  function change({ target }) {
+    const found = why || read(job.do, target.value, job.number, places, job.source);
+    if (typeof found !== "string") send({ jobs: jobs.map((other) => (other === job ? found : other)) });
+    else {
+      target.value = written(job);
+      say(found);
+    }
+  }
+
+  const tool = (label, name, end, entries) => html`<button class="quiet" type="button" aria-label=${`${label} job ${at + 1}`}
+    ...${barred(why || end, label)} onClick=${() => (why || end ? say(why || end) : send({ jobs: entries }))}><${Icon} name=${name} /></button>`;
+  const moved = (by) => others.toSpliced(at + by, 0, job);
+  return html`<li class="job" data-stage=${stage} data-number=${job.number}>
+    <span class="stage" title=${word}><${Icon} name=${symbol} /><span class="spoken">${word}</span></span>
+    <span class="kind">${kind}</span>
+    <input class="what" value=${written(job)} aria-label=${`${kind} ${at + 1}`} readonly=${why !== ""} maxlength="400" autocomplete="off"
+      title=${why || (job.do === "move" && places[job.to] ? goalText(places[job.to]) : undefined)} onChange=${change} />
+    <span class="tools-job">${tool("Earlier", "arrow_upward", at === 0 && "It's the first.", moved(-1))}
+      ${tool("Later", "arrow_downward", at === jobs.length - 1 && "It's the last.", moved(1))}
+      ${tool("Remove", "delete", "", others)}</span>
+    ${note && html`<span class="note" data-bad=${forecast?.problem ? "" : undefined}>${note}</span>`}</li>`;
+}
+
+function NewJob({ why, places, number, say, add }) {
+  const [kind, setKind] = useState("move");
+  const [text, program] = [useRef(null), useRef(null)];
+
+  function submit(event) {
+    event.preventDefault();
+    const job = why || read(kind, text.current.value, number, places, program.current.value);
+    say(typeof job === "string" ? job : "");
+    if (typeof job === "string") return;
+    text.current.value = program.current.value = "";
+    add(job);
+  }
+
+  return html`<form class="job-add" id="job-add" onSubmit=${submit}>
+    <${Choice} id="job-kind" label="Kind of job" options=${Object.entries(KINDS).map(([value, { name }]) => [value, name])} value=${kind} choose=${setKind} />
+    <input id="job-text" ref=${text} aria-label="Of the new job" autocomplete="off" maxlength="400" placeholder=${KINDS[kind].hint} />
+    <button class="main" id="job-add-it" ...${barred(why, "Add it at the end")}>Add</button>
+    <textarea id="job-source" ref=${program} rows="5" hidden=${kind !== "arm"} spellcheck="false" maxlength="16000"
+      aria-label="VAL-II file of the program" placeholder=${".PROGRAM pick\n…\n.END"}></textarea></form>`;
+}
+
+function NewPlace({ session, why, say, add }) {
+  const input = useRef(null);
+
+  function submit(event) {
+    event.preventDefault();
+    const real = session.state?.real;
+    const name = input.current.value.trim();
+    const wrong = why || (!real && "Nobody knows where the robot is.") || (!name && "Give the place a name first.") || "";
+    say(wrong);
+    if (wrong) return;
+    input.current.value = "";
+    const [x, y, heading] = real.map((value) => Math.round(value * 1000) / 1000);
+    add({ [name]: { x, y, heading } });
+  }
+
+  return html`<form class="job-add" id="place-add" onSubmit=${submit}><span class="muted">Here is</span>
+    <input id="place-name" ref=${input} aria-label="Name of a place" placeholder="name" maxlength="40" autocomplete="off" />
+    <button ...${barred(why, "Keep where the robot is under this name")}>Keep place</button></form>`;
 }

@@ -207,15 +207,9 @@ export class Jogging {
 
   /** Ask the server for the saved poses, perhaps after a change: {name, q}, or {name} to delete one; why not, "" where it's done. */
   async poses(change) {
-    const { token } = this.session;
-    const headers = token ? { Authorization: "Bearer " + token } : {};
-    try {
-      const given = change && { method: "POST", body: JSON.stringify(change) };
-      const { poses, problem = "" } = await (await fetch(window.VrsLink.FOLDER + "/poses", { headers, ...given })).json();
-      if (poses && JSON.stringify(poses) !== JSON.stringify(this.saved)) this.saved = poses;
-      return problem;
-    } catch {
-      return "the server doesn't answer: nothing was done";
-    }
+    const given = change && { method: "POST", body: JSON.stringify(change) };
+    const { poses, problem = "" } = await this.session.ask("/poses", given);
+    if (poses && JSON.stringify(poses) !== JSON.stringify(this.saved)) this.saved = poses;
+    return problem;
   }
 }

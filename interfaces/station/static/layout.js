@@ -27,28 +27,27 @@ export function App({ station }) {
   const at = (place) => panels.filter((panel) => panel.place === place)
     .map((panel) => html`<${Card} key=${panel.name} station=${station} panel=${panel} />`);
   return html`
-    <div id="bar"><h1 class="name">VRS teleop</h1>
+    <header id="bar"><h1 class="name">VRS teleop</h1>
       ${robots.length > 0 && html`<nav id="robots" aria-label="Robots">
         ${robots.map(([name, page, here]) => html`<a href=${page} aria-current=${here && "page"}>${name}</a>`)}</nav>`}
-      <div id="bar-panels">${at("header")}</div></div>
-    <div id="work">
+      <div id="bar-panels">${at("header")}</div></header>
+    <main id="work">
       <div id="pane-box">${at("pane")}</div>
       <${Splitter} />
       <div id="side"><${Tabs} station=${station} /><div id="tab-panels">${at("side")}</div></div>
-    </div>
-    <div id="strip-box">${at("strip")}</div>
+    </main>
+    <section id="strip-box" aria-label="What was and what is planned">${at("strip")}</section>
     ${at("nowhere")}`;
 }
 
-/** A panel's place: its component, or the element that its `mount` fills. */
+/** A panel's place. The camera's picture stands beside the stick: one drives by it. */
 function Card({ station, panel: { name, place } }) {
   const { layout } = station;
   const module = layout.modules[name];
-  const tabbed = place === "side" ? { role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: layout.shown !== name } : {};
-  const box = useRef(null);
-  useEffect(() => module?.mount?.(station, box.current), [module]);
+  const shown = layout.shown === name || (name === "camera" && layout.shown === "drive");
+  const tabbed = place === "side" ? { role: "tabpanel", "aria-labelledby": `tab-${name}`, hidden: !shown } : {};
   return html`<div id=${`card-${name}`} class="card" ...${tabbed}>
-    <div id=${`panel-${name}`} class=${`panel panel-${name}`} ref=${box}>${module?.Panel && html`<${module.Panel} station=${station} />`}</div></div>`;
+    <div id=${`panel-${name}`} class=${`panel panel-${name}`}>${module?.Panel && html`<${module.Panel} station=${station} />`}</div></div>`;
 }
 
 function Tabs({ station: { layout, drives } }) {

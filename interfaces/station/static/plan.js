@@ -6,6 +6,10 @@ const DRAG = 0.15;
 const SIGMAS = 2;
 const LEAST = 0.02;
 const MARGIN = 0.15;
+/** For the axes' numbers [m], and what lies between two of them: the first of which there are few enough [m]. */
+const AXIS = 0.5;
+const TICKS = [1, 2, 5, 10, 20, 50, 100];
+const MOST_TICKS = 12;
 /** Length of a heading's arrow [m]. */
 const ARROW = 0.55;
 
@@ -18,8 +22,11 @@ function s(tag, props = {}) {
 const path = (points) => points.map(([x, y], k) => `${k ? "L" : "M"}${x.toFixed(3)} ${y.toFixed(3)}`).join("");
 
 export class FloorPlan {
-  /** @param {Function} chosen is given a goal */
-  constructor(chosen) {
+  /**
+   * @param {Function} chosen is given a goal
+   * @param {Function} pointed is given where the pointer is [m], null where it's away
+   */
+  constructor(chosen, pointed) {
     this.element = s("svg", { class: "plan", id: "map", role: "img", "aria-label": "Map of the known walls, the robots and the route" });
     this.world = s("g");
     const layer = (tag, name, props = {}) => {
@@ -28,6 +35,7 @@ export class FloorPlan {
       return element;
     };
     this.floor = layer("rect", "plan-floor", { x: 0, y: 0 });
+    this.grid = layer("path", "plan-grid");
     this.things = layer("path", "plan-things");
     this.vias = layer("g", "plan-vias");
     this.line = layer("path", "plan-route");
@@ -37,11 +45,14 @@ export class FloorPlan {
     this.virtual = layer("path", "plan-virtual");
     this.real = layer("path", "plan-real");
     this.goal = layer("path", "plan-goal");
-    this.element.append(this.world);
+    this.axes = s("g", { class: "plan-axes" });
+    this.element.append(this.world, this.axes);
     this.known = null;
     this.lastSeen = null;
     this.begun = null;
     this.#listen(chosen);
+    this.element.addEventListener("pointermove", (event) => this.known && pointed(this.#at(event)));
+    this.element.addEventListener("pointerleave", () => pointed(null));
   }
 
   /** Show the known map. */
@@ -49,12 +60,30 @@ export class FloorPlan {
     if (plan === this.known) return;
     this.known = plan;
     const [length, width] = plan.size;
-    this.element.setAttribute("viewBox", `${-MARGIN} ${-MARGIN} ${length + 2 * MARGIN} ${width + 2 * MARGIN}`);
+    this.element.setAttribute("viewBox", `${-AXIS} ${-MARGIN} ${length + AXIS + MARGIN} ${width + AXIS + MARGIN}`);
+    this.#rule(length, width);
     this.world.setAttribute("transform", `matrix(1 0 0 -1 0 ${width})`);
     this.floor.setAttribute("width", length);
     this.floor.setAttribute("height", width);
     this.things.setAttribute("d", plan.things.map((ring) => path(ring) + "Z").join(""));
     this.vias.replaceChildren(...plan.via.map(([x, y]) => s("circle", { cx: x, cy: y, r: 0.05 })));
+  }
+
+  /** A grid, with its metres at the edges. */
+  #rule(length, width) {
+    const step = TICKS.find((one) => Math.max(length, width) / one <= MOST_TICKS) ?? TICKS.at(-1);
+    const marks = (most) => Array.from({ length: Math.floor(most / step + 1e-9) + 1 }, (_, k) => k * step);
+    const text = (words, props) => {
+      const element = s("text", props);
+      element.textContent = words;
+      return element;
+    };
+    this.grid.setAttribute("d", marks(length).map((x) => `M${x} 0V${width}`).join("") + marks(width).map((y) => `M0 ${y}H${length}`).join(""));
+    this.axes.replaceChildren(
+      ...marks(length).map((x) => text(x ? String(x) : "0 m", { x, y: width + 0.36, "text-anchor": "middle" })),
+      ...marks(width).slice(1).map((y) => text(String(y), { x: -0.1, y: width - y + 0.09, "text-anchor": "end" })),
+      text("x", { x: length - 0.5 * step, y: width + 0.36, "text-anchor": "middle", class: "axis" }),
+      text("y", { x: -0.1, y: 0.09 + width - (Math.floor(width / step) - 0.5) * step, "text-anchor": "end", class: "axis" }));
   }
 
   /** Show where both robots are; the real one only where that's known. */

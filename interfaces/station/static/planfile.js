@@ -1,51 +1,31 @@
 // Plan files (docs/plan-files.md): what is planned, saved to one; and one's moves, given again one after the other.
-import { movesBetween } from "./moves.js";
-import { clockText, DEGREES, Dialog, html, save, useRef, useState } from "./ui.js";
+import { Dialog, html, save, useRef, useState } from "./ui.js";
 
 /** A plan that is loaded begins so long after it was asked for [s], or after what is planned. */
 const LEAD = 1;
-/** In the file the first move begins then [s]. */
-const FIRST = 0.5;
 
-/** The moves that are still to come. */
-export function planned({ timeline, now, reader }) {
-  if (!timeline || now === null) return [];
-  return movesBetween(timeline, now, Infinity, (id, t) => reader.nameOf(id, t)).filter(({ start }) => start > now);
+/** Whether moves are still to come. */
+export function isPlanned({ timeline, now }) {
+  if (!timeline || now === null) return false;
+  const under = timeline.segments[Math.max(0, timeline.indexAt(now))]?.commandId;
+  return timeline.segments.some(({ start, commandId }) => start > now && commandId !== null && commandId !== under);
 }
 
 /** Save what is planned. */
-export function saveMoves({ session, chain }) {
-  const moves = planned(session);
-  const inDegrees = (x, k) => (chain.slides(k) ? x : x * DEGREES);
-  const rows = moves.map(({ start, end, name }) => {
-    const { speed, motion, profile, label } = name ?? {};
-    const execute = start - moves[0].start + FIRST;
-    const move = session.timeline.joints(end).map(inDegrees);
-    return { issue: 0, execute, move, speed, motion, profile, insertion: "append", comment: label || undefined };
-  });
-  const title = `Planned at ${clockText(session.now)}`;
-  const start = session.timeline.joints(moves[0].start).map(inDegrees);
-  const lines = [{ schema: "vrs-plan/1", title, start }, ...rows].map((line) => JSON.stringify(line) + "\n");
-  save(lines, `plan-${Math.round(session.now)}s.jsonl`);
-}
-
-/** A plan file's commands, by the server, which knows what fits the robot; or what is wrong. */
-async function read(file, { token }) {
-  const address = `${window.VrsLink.FOLDER}/plan?name=${encodeURIComponent(file.name)}`;
-  try {
-    const answer = await fetch(address, { method: "POST", headers: token ? { Authorization: "Bearer " + token } : {}, body: file });
-    return await answer.json();
-  } catch {
-    return { problem: "the server doesn't answer: nothing was loaded" };
-  }
+export async function savePlan(station) {
+  const { session } = station;
+  const { plan, problem } = await session.ask("/plan");
+  if (problem) station.refuse(problem);
+  else save([plan], `plan-${Math.round(session.now)}s.jsonl`);
 }
 
 /** Give commands one after the other, the first at a time [s]; why one isn't taken, "" where all are. */
 async function give({ commands, session, replace }) {
   const times = commands.map(({ execute_at: at, issued_at: issued }) => at ?? issued);
   const shift = (replace ? session.now : Math.max(session.now, session.timeline.end)) + LEAD - Math.min(...times);
+  const opening = replace ? commands.findIndex(({ type }) => type === "move") : -1;
   for (const [k, { issued_at, ...command }] of commands.entries()) {
-    const first = replace && k === 0 ? { insertion: "replace" } : {};
+    const first = k === opening ? { insertion: "replace" } : {};
     const entry = session.order({ ...command, execute_at: times[k] + shift, ...first }, `plan ${k + 1}`);
     while (entry && entry.outcome === null && !entry.forgotten) await new Promise((resolve) => setTimeout(resolve, 20));
     const { refusal, receipt } = entry?.outcome ?? { refusal: "it wasn't sent" };
@@ -63,7 +43,7 @@ export function Loader({ strip: { station, session, idle }, tool }) {
   async function choose({ target }) {
     const [file] = target.files;
     target.value = "";
-    const { problem, title, commands } = await read(file, session);
+    const { problem, title, commands } = await session.ask(`/plan?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
     if (problem) station.refuse(problem);
     else setFound({ title, commands });
   }

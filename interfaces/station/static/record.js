@@ -59,21 +59,12 @@ export class Recordings {
 
   /** Ask the server; what it answers, or null where it doesn't do it. */
   async ask(what, name) {
-    const { token } = this.station.session;
-    const headers = { "Content-Type": "application/json", ...(token && { Authorization: "Bearer " + token }) };
     this.busy = true;
-    try {
-      const body = JSON.stringify({ do: what, ...(name && { name }) });
-      const answer = await fetch(window.VrsLink.FOLDER + "/recordings", { method: "POST", headers, body });
-      const found = await answer.json();
-      this.complain(found.problem ?? "");
-      return answer.ok ? found : null;
-    } catch {
-      this.complain("The server doesn't answer: nothing was done.");
-      return null;
-    } finally {
-      this.busy = false;
-    }
+    const body = JSON.stringify({ do: what, ...(name && { name }) });
+    const found = await this.station.session.ask("/recordings", { method: "POST", body });
+    this.busy = false;
+    this.complain(found.problem ?? "");
+    return found.problem ? null : found;
   }
 
   complain(text) {

@@ -281,6 +281,20 @@ export class Session extends EventTarget {
     return entry;
   }
 
+  /** Ask the server by HTTP, by its address below the page's. */
+  fetch(path, given) {
+    return fetch(window.VrsLink.FOLDER + path, { headers: this.token ? { Authorization: "Bearer " + this.token } : {}, ...given });
+  }
+
+  /** The same of what answers in JSON: where it doesn't do it, the answer's `problem` says why. */
+  async ask(path, given) {
+    try {
+      return await (await this.fetch(path, given)).json();
+    } catch {
+      return { problem: "the server doesn't answer: nothing was done" };
+    }
+  }
+
   /** Ask something of the lease, or of the way to the robot; the request's number, 0 where it couldn't be sent. */
   wish(type, fields = {}) {
     const message = { type, number: ++this.requests, ...fields };

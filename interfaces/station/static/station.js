@@ -23,8 +23,6 @@ class Station extends EventTarget {
     this.chain = this.drives ? null : new Chain(config.robot);
     this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
     this.layout = new Layout(config.panels);
-    /** What panels offer each other, by the panel's name. */
-    this.shared = {};
     observed(this, {
       // What is said to those who listen to the page.
       polite: "",
@@ -33,6 +31,8 @@ class Station extends EventTarget {
       cursor: null,
       /** The 3D view, see twins.js; null before it's there, and where the browser draws none. */
       scene: null,
+      /** The camera of a mobile robot, see camera.js, once its panel is there. */
+      camera: null,
       /** VAL-II's terminal, once its panel is there. */
       terminal: null,
     });

@@ -35,8 +35,7 @@ export class Stills {
   }
 
   async fetch() {
-    const headers = this.session.token ? { Authorization: "Bearer " + this.session.token } : {};
-    const answer = await fetch(window.VrsLink.FOLDER + "/media/still", { headers });
+    const answer = await this.session.fetch("/media/still");
     this.rate = answer.ok ? 1000 / PERIOD : 0;
     if (!answer.ok) return;
     const before = this.image.src;

@@ -1,7 +1,7 @@
 // The timeline as a strip: what was to the left, what is planned to the right, and what may be changed by hand.
-import { Marks, Moves } from "./bars.js";
+import { Grips, Marks, Moves } from "./bars.js";
 import { movesBetween } from "./moves.js";
-import { Loader, planned, saveMoves } from "./planfile.js";
+import { isPlanned, Loader, savePlan } from "./planfile.js";
 import { View } from "./timeview.js";
 import { clockText, html, Icon, isTyping, observed, useComputed, useEffect, useMemo, useOn, useRef, useState } from "./ui.js";
 
@@ -113,13 +113,13 @@ class Strip {
   }
 
   /** Go on with the time; whether something is to be put in its place. */
-  advance(at, width) {
+  advance(at, track) {
     const { session, view } = this;
     const { now, timeline } = session;
     if (now === null || !timeline || document.hidden || (at - this.drawnAt < BETWEEN && !this.stale)) return false;
     this.play(this.played ? (at - this.drawnAt) / 1000 : 0);
     [this.drawnAt, this.played] = [at, this.plays];
-    if (view.advance(now, width) || this.stale || now >= this.due) this.draw(timeline, now);
+    if (view.advance(now, track.clientWidth) || this.stale || now >= this.due) this.draw(timeline, now);
     return true;
   }
 
@@ -177,8 +177,8 @@ function Tools({ strip }) {
     ${tool("undo", "undo", "Take back the newest command", () => session.order(null), "Undo", { why: idle })}
     ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
     <span class="gap"></span>
-    ${tool("save", "download", "Save what is planned to a plan file: the moves, without vias and roundings", () => saveMoves(station), "Save",
-      { why: planned(session).length ? "" : "nothing is planned that could be saved" })}
+    ${tool("save", "download", "Save what is planned to a plan file", () => savePlan(station), "Save",
+      { why: isPlanned(session) ? "" : "nothing is planned that could be saved" })}
     <${Loader} strip=${strip} tool=${tool} />
     <span class="gap"></span>
     ${tool("delete", "delete", "Take the chosen move out of the plan", () => strip.remove(chosen), "Delete", { why })}
@@ -202,7 +202,7 @@ function Track({ strip }) {
   useEffect(() => {
     let frame = requestAnimationFrame(function next(at) {
       frame = requestAnimationFrame(next);
-      if (strip.advance(at, track.current.clientWidth)) place();
+      if (strip.advance(at, track.current)) place();
     });
     return () => cancelAnimationFrame(frame);
   }, []);
@@ -259,8 +259,10 @@ function Track({ strip }) {
   return html`<div class="track" id="track" role="group" aria-label="Timeline" ref=${track} onWheel=${turn} onPointerDown=${press}
     onPointerMove=${(event) => track.current.hasPointerCapture(event.pointerId) && scrub(event)}>
     <div class="past" ref=${past}></div>
-    <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0" ref=${slider} onKeyDown=${key}></div>
-    <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Moves} strip=${strip} /></div>
+    <div class="slider" id="slider" role="slider" tabindex="0" aria-label="Time that is shown" aria-valuemin="0"
+      aria-valuenow="0" ref=${slider} onKeyDown=${key}></div>
+    <div class="world" ref=${world}><div class="committed" ref=${ahead}></div><${Marks} strip=${strip} /><${Grips} strip=${strip} />
+      <${Moves} strip=${strip} /></div>
     <div class="at real" ref=${real}><span>real</span></div><div class="at now" ref=${now}><span>now</span></div>
     <div class="at cursor" hidden ref=${cursor}></div></div>`;
 }

@@ -1,5 +1,5 @@
 // What panels share of what a robot does by itself: asking for it, and saying why it can't be.
-import { DEGREES } from "./dom.js";
+import { DEGREES } from "./ui.js";
 
 /** Kinds of news of the server that are kept as they come. */
 export const NEWS = ["tasks", "seen", "plan"];

@@ -71,8 +71,6 @@ function map(x, where, check) {
 const STATUS = new Set(["accepted", "postponed", "rejected"]);
 const REFUSAL_CODE = new Set(["other", "overruled", "not-following"]);
 const FRAME_STATUS = new Set(["predicted", "confirmed", "falsified"]);
-const MOTION = new Set(["joint", "line"]);
-const PROFILE = new Set(["parabolic", "jerk-limited"]);
 const PROBLEM_CODE = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
 const LEASE_STATE = new Set(["free", "held", "ending"]);
 const LEASE_END = new Set(["released", "expired", "taken over"]);
@@ -163,9 +161,7 @@ function checkCommandName(m) {
   real(m.t, -1e9, 1e9, "CommandName.t"); // From this session time on [s]: steering goes one way, then another.
   text(m.kind, 0, 200, "CommandName.kind"); // Type of the command.
   m.label = m.label === undefined ? "" : text(m.label, 0, 60, "CommandName.label"); // As the order said.
-  m.speed = m.speed === undefined ? 1.0 : real(m.speed, 0, 1, "CommandName.speed"); // Of a move, as it was commanded; so are motion and profile.
-  m.motion = m.motion === undefined ? "joint" : word(m.motion, MOTION, "CommandName.motion");
-  m.profile = m.profile === undefined ? "parabolic" : word(m.profile, PROFILE, "CommandName.profile");
+  m.speed = m.speed === undefined ? 1.0 : real(m.speed, 0, 1, "CommandName.speed"); // Of a move, as it was commanded.
   return m;
 }
 
@@ -265,6 +261,27 @@ function checkProblem(m) {
   m.number = m.number === undefined || m.number === null ? null : whole(m.number, 1, WHOLE, "problem.number"); // Of what it's about, where that's known.
   m.fatal = m.fatal === undefined ? false : flag(m.fatal, "problem.fatal"); // Whether the connection ends.
   m.field = m.field === undefined ? "" : text(m.field, 0, 200, "problem.field"); // Of an `Impair`: which of `delay`, `loss` and `service` it's about; empty where it's none of them.
+  return m;
+}
+
+/** Either side: Correct the path that a program alters on a channel. The answer is a `Corrected` or a `Problem`. The server hands it on to a client with `alters` that has control, which answers the server in its turn. */
+function checkPathCorrection(m) {
+  map(m, "correct");
+  if (m.type !== undefined && m.type !== "correct") fail("correct", "correct");
+  whole(m.number, 1, WHOLE, "correct.number"); // The sender's own; the answer has it, too.
+  whole(m.channel, 0, 255, "correct.channel"); // Of the program's ALTER.
+  numbers(m.offset, 6, 6, -1e9, 1e9, "correct.offset"); // Translation [m], then rotation vector [rad], (6,): along which axes, and whether it adds up, says ALTER.
+  m.epoch = m.epoch === undefined || m.epoch === null ? null : like(m.epoch, /^[1-9][0-9]{0,19}$/, "correct.epoch"); // Of who has control, or shares it; others may correct a program of a client with `alters`.
+  m.at = m.at === undefined || m.at === null ? null : real(m.at, -1e9, 1e9, "correct.at"); // For when it's meant [s], within 0.2 s of now; absent: for when it comes.
+  return m;
+}
+
+/** Either side: A correction is on the path. */
+function checkCorrected(m) {
+  map(m, "corrected");
+  if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
+  whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
+  m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
   return m;
 }
 
@@ -391,15 +408,6 @@ function checkNetwork(m) {
   m.offset = m.offset === undefined || m.offset === null ? null : real(m.offset, -1e9, 1e9, "network.offset"); // D, where it's fixed [s]; absent: it adapts, or isn't known.
   m.advice = m.advice === undefined ? "" : text(m.advice, 0, 2000, "network.advice"); // What is likely to go wrong under these conditions, for people.
   m.answers = m.answers === undefined || m.answers === null ? null : whole(m.answers, 1, WHOLE, "network.answers"); // Number of the receiver's request that this answers.
-  return m;
-}
-
-/** Server: A correction is on the path. */
-function checkCorrected(m) {
-  map(m, "corrected");
-  if (m.type !== undefined && m.type !== "corrected") fail("corrected", "corrected");
-  whole(m.number, 1, WHOLE, "corrected.number"); // Of the `PathCorrection`.
-  m.late = m.late === undefined ? "" : text(m.late, 0, 2000, "corrected.late"); // What keeps the arm from following in time; empty where nothing does.
   return m;
 }
 
@@ -654,11 +662,12 @@ const CHECKS = new Map([
   ["ping", checkPing],
   ["pong", checkPong],
   ["problem", checkProblem],
+  ["correct", checkPathCorrection],
+  ["corrected", checkCorrected],
   ["welcome", checkWelcome],
   ["lease", checkLease],
   ["state", checkState],
   ["network", checkNetwork],
-  ["corrected", checkCorrected],
   ["present", checkPresent],
   ["mobile-welcome", checkMobileWelcome],
   ["postures", checkPostures],
@@ -668,7 +677,7 @@ const CHECKS = new Map([
 ]);
 
 /** Types of messages that bear the epoch of the lease under which they're sent. */
-export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "correct", "task"]);
+export const LEASED = new Set(["order", "release", "resume", "beat", "impair", "task"]);
 
 const told = new Set();
 

@@ -115,7 +115,9 @@ window.VrsScene = class {
     viewer.gui.domElement.style.display = "none";
     const resize = viewer.set_3d_pane_size.bind(viewer);
     viewer.set_3d_pane_size = () => {
-      if (pane.clientWidth && pane.clientHeight) resize(pane.clientWidth, pane.clientHeight);
+      // Kept: to ask for it in each frame would lay out the page in each.
+      [this.width, this.height] = [pane.clientWidth, pane.clientHeight];
+      if (this.width && this.height) resize(this.width, this.height);
     };
     new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
     viewer.set_3d_pane_size();
@@ -170,7 +172,7 @@ window.VrsScene = class {
     const camera = this.viewer.camera;
     camera.fov = 32;
     const half = (camera.fov * Math.PI) / 360;
-    const narrow = Math.min(1, this.pane.clientWidth / this.pane.clientHeight);
+    const narrow = Math.min(1, this.width / this.height);
     const radius = 0.5 * Math.hypot(...low.map((x, k) => high[k] - x));
     // Of an arm, nearer than would show the whole reach: it's rarely stretched out.
     const root = this.node(VrsScene.ROOT);
@@ -221,8 +223,7 @@ window.VrsScene = class {
   writeLabels() {
     const path = this.node(VrsScene.ROOT, "committed");
     const play = path.play;
-    const width = this.pane.clientWidth;
-    const height = this.pane.clientHeight;
+    const { width, height } = this;
     const taken = [];
     let used = 0;
     this.ahead = null;
@@ -251,8 +252,8 @@ window.VrsScene = class {
       VrsScene.write(label, end ? "rest in " + left.toFixed(1) + " s" : left.toFixed(1) + " s");
       label.className = end ? "end" : "";
       label.hidden = false;
-      const beside = x + 12 + label.offsetWidth < width ? x + 12 : x - 12 - label.offsetWidth;
-      label.style.transform = "translate(" + Math.round(beside) + "px, " + Math.round(y - 22) + "px)";
+      const [way, back] = x + 12 + wide < width ? [x + 12, ""] : [x - 12, " translateX(-100%)"];
+      label.style.transform = "translate(" + Math.round(way) + "px, " + Math.round(y - 22) + "px)" + back;
     }
     for (let k = used; k < this.pool.length; k++) this.pool[k].hidden = true;
   }

@@ -122,7 +122,7 @@ def command(line: str) -> MonitorCommand:
     """
     word, rest = split_word(line)
     upper = word.upper()
-    if _ASSIGNMENT.fullmatch(line):
+    if _ASSIGNMENT.fullmatch(line) and not (upper in COMMANDS and COMMANDS[upper].forms == "new=old"):
         raise ValError("Invalid command", f"{_short(line)}: an assignment is an instruction, DO {_short(line)}")
     is_instruction = upper in forms.INSTRUCTIONS
     found = [] if is_instruction and upper not in COMMANDS else _candidates(word)

@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+import numpy as np
 from typing_extensions import override
 
-from interfaces.messages.control import Acquire, Lease, Release, Resume, Share
+from interfaces.clients.designer import Issued
+from interfaces.messages.control import (
+    Acquire,
+    Corrected,
+    Lease,
+    PathCorrection,
+    Problem,
+    ProblemCode,
+    Release,
+    Resume,
+    Share,
+)
 from interfaces.val2.context import Event
 from interfaces.val2.controller import Controller
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
+from interfaces.val2.motion.places import in_millimetres
 from robots.onboard.lease import LeaseState
+from vrs.model import Array
+from vrs.scheduler import FRESH
 
 if TYPE_CHECKING:
     from interfaces.stream.connection import Connection
@@ -70,6 +85,17 @@ class Control:
         """What is wrong with the robot or the way to it; None where nothing is."""
         return None
 
+    correction_poll_interval = math.inf
+    """How often it's to be asked for corrections while a program alters its path [s], else `_SELDOM` times that;
+    infinity for never."""
+
+    def take_corrections(self) -> Sequence[PathCorrection]:
+        """What others have asked of the path of a program since this was called last."""
+        return ()
+
+    def answer_correction(self, answer: Corrected | Problem) -> None:
+        """Tell who asked what came of one of them."""
+
 
 Listener: TypeAlias = Callable[[Event], None]
 """A terminal, as what takes the events of the controller when it's in control."""
@@ -88,6 +114,9 @@ class SharedController:
         self.controller, self.control = controller, control
         self.holder: Listener | None = None
         """The terminal in control."""
+        self._corrections: dict[int, int] = {}
+        """Corrections that are to be answered: numbers of what the arm was asked for, by theirs."""
+        self._now = -math.inf
 
     def request(self, terminal: Listener, session: str | None = None, *, now: float) -> ControlAnswer:
         """Ask for control for a terminal.
@@ -137,8 +166,51 @@ class SharedController:
 
     def advance(self, *, now: float) -> None:
         """Do what is due, and tell the terminal in control."""
+        self._now = now
         self._notice(now)
+        self._correct(now)
         self._tell(now)
+
+    def correct(self, channel: int, offset: Array, at: float, *, now: float) -> Issued | None:
+        """Correct the path of the program that alters it on a channel; see `interfaces.stream.hub.PathAlterer`.
+
+        Returns:
+            What came of it; None while nothing was heard.
+
+        Raises:
+            ValError: If none does, or it can't be.
+        """
+        arm = self.controller.arm
+        if not arm.altering(channel, now=now):
+            raise ValError("Path isn't altered", f"no program has ALTER on for channel {channel}")
+        if abs(at - now) > FRESH:
+            raise ValError("Illegal value", f"a correction is for now, within {FRESH:g} s")
+        values = (*(1000.0 * offset[:3]).tolist(), *np.degrees(offset[3:]).tolist())
+        return arm.correct(values, given=at, now=now)
+
+    def _correct(self, now: float) -> None:
+        """Correct the path as others want, and answer what has been answered."""
+        robot = self.controller.arm.robot
+        for wish in self.control.take_corrections():
+            before = robot.newest
+            try:
+                self.correct(wish.channel, wish.offset, now if wish.at is None else wish.at, now=now)
+                if robot.newest == before:
+                    raise ValError("Path can't be altered so", "it's a dry run")
+            except ValError as error:
+                self.control.answer_correction(Problem(ProblemCode.OUT_OF_RANGE, str(error), wish.number))
+            else:
+                self._corrections[wish.number] = robot.newest
+        for number, asked in tuple(self._corrections.items()):
+            outcome = robot.outcome(asked, now=now)
+            if outcome is None:
+                continue
+            del self._corrections[number]
+            late = "" if outcome.receipt is None else outcome.receipt.hindrance
+            refused = str(ValError("Path can't be altered so", in_millimetres(outcome.reason)))
+            self.control.answer_correction(
+                Problem(ProblemCode.OUT_OF_RANGE, refused, number) if outcome.reason else Corrected(number, late)
+            )
 
     def _tell(self, now: float) -> None:
         for event in self.controller.advance(now=now):
@@ -147,9 +219,13 @@ class SharedController:
 
     def next_deadline(self) -> float:
         """When something is due [s]; infinity for never."""
-        return self.controller.next_deadline()
+        altered = bool(self._corrections) or self.controller.arm.altered_since(now=self._now) is not None
+        polled = self.control.correction_poll_interval * (1.0 if altered else _SELDOM)
+        return min(self.controller.next_deadline(), self._now + polled)
 
 
+_SELDOM: Final = 10.0
+"""How much longer a correction may wait that nothing is to be done with."""
 LEASE_TIMEOUT: Final = 3.0
 """How long the lease is waited for [s]; the robot comes to rest between two."""
 FOLLOW_TIMEOUT: Final = 10.0
@@ -278,6 +354,29 @@ class LeaseControl(Control):
             self._resumed = now
             self._client.ask(lambda number: Resume(number, epoch))
         return robot_halted(state.halted, commanded=epoch is not None)
+
+
+class RemoteControl(LeaseControl):
+    """The same of a client elsewhere, to whose programs others send corrections by the server."""
+
+    correction_poll_interval = 0.01
+
+    def __init__(self, connection: Connection) -> None:
+        """Ask for nothing yet.
+
+        Args:
+            connection: With `alters`.
+        """
+        super().__init__(connection)
+        self._connection = connection
+
+    @override
+    def take_corrections(self) -> Sequence[PathCorrection]:
+        return self._connection.take_corrections()
+
+    @override
+    def answer_correction(self, answer: Corrected | Problem) -> None:
+        self._connection.answer_correction(answer)
 
 
 class ServedControl(LeaseControl):

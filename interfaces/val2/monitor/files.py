@@ -115,14 +115,20 @@ class Files:
         with _tried(old.name):
             old.replace(new)
 
+    def shown(self, path: Path) -> str:
+        """A file as people are told of it: by its name, or how to get there where it's elsewhere."""
+        return path.name if path.parent == self.directory else str(path.resolve())
+
     def listed(self) -> list[str]:
-        """The names of the files in the directory, without the suffix.
+        """The names of the files in the directory, without the usual suffix; those of others where they're taken.
 
         Raises:
             ValError: If it can't be read.
         """
         with _tried(self.directory):
-            return sorted(path.stem for path in self.directory.glob(f"*{SUFFIX}") if path.is_file())
+            paths = self.directory.glob("*" if self.anywhere else f"*{SUFFIX}")
+            plain = (path for path in paths if not path.name.startswith(".") and path.is_file())
+            return sorted(path.stem if path.suffix == SUFFIX else path.name for path in plain)
 
 
 @contextlib.contextmanager

@@ -168,6 +168,7 @@ def status(state: TerminalState, _rest: str) -> None:
             ("Power", "on" if controller.switches[POWER] else "off"),
             ("Arm", "stands" if all(abs(a - b) < 1e-6 for a, b in zip(here, there, strict=True)) else "moves"),
             ("Session time", f"{layout.fixed(state.now, 3)} s"),
+            *((f"Jt {n}", name) for n, name in enumerate(arm.joint_names, 1)),
         ])
     )  # fmt: skip
     for depth, (name, step) in enumerate(reversed(current.stack[:-1]), 1):

@@ -194,7 +194,7 @@ def store(state: TerminalState, rest: str, *, parts: str) -> Dialogue:
         counts = [(len(source.programs), "program"), (len(source.values), "value")]
         state.say(f"{path.name}: {', '.join(_counted(*count) for count in counts)}")
 
-    yield from state.confirm(f"{path.name} exists. Write over it" if path.exists() else "", write)
+    yield from state.confirm(f"{state.files.shown(path)} exists. Write over it" if path.exists() else "", write)
 
 
 def _counted(many: int, what: str) -> str:
@@ -279,7 +279,7 @@ def put(state: TerminalState, rest: str, *, keep: bool) -> Dialogue:
 def file_delete(state: TerminalState, rest: str) -> Dialogue:
     """FDELETE file."""
     path = _existing(state, rest)
-    yield from state.confirm(f"Delete {path.name}", lambda: state.files.delete(path))
+    yield from state.confirm(f"Delete {state.files.shown(path)}", lambda: state.files.delete(path))
 
 
 def file_rename(state: TerminalState, rest: str) -> Dialogue:
@@ -288,14 +288,14 @@ def file_rename(state: TerminalState, rest: str) -> Dialogue:
     if name is None:
         raise ValError("Missing argument", "FRENAME new=old")
     new, old = state.files.path(given), _existing(state, name)
-    question = f"{new.name} exists. Replace it" if new.exists() and new != old else ""
+    question = f"{state.files.shown(new)} exists. Replace it" if new.exists() and new != old else ""
     yield from state.confirm(question, lambda: state.files.rename(old, new))
 
 
 def _existing(state: TerminalState, name: str) -> Path:
     path = state.files.path(name)
     if not path.is_file():
-        raise ValError("Nonexistent file", path.name)
+        raise ValError("Nonexistent file", state.files.shown(path))
     return path
 
 

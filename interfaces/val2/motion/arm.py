@@ -13,15 +13,15 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from interfaces.clients.designer import Issued
 from interfaces.messages import RefusalCode
 from interfaces.teleop.operator import NOT_FOLLOWING
 from interfaces.val2.errors import TAKEN, ValError, robot_halted
+from interfaces.val2.motion.conventions import ArmConventions, conventions_of
 from interfaces.val2.motion.hand import OPEN, REMEMBERED, Gripped, Hand
 from interfaces.val2.motion.places import (
-    NEST,
-    READY,
     Alterations,
     Frames,
     Where,
@@ -35,6 +35,7 @@ from interfaces.val2.motion.robot import RobotPort
 from interfaces.val2.motion.speeds import MonitorSpeed, MotionSettings, SettingsInForce, Speed, bounded, require
 from interfaces.val2.rows import numbered
 from interfaces.val2.values import Location, PrecisionPoint, Transformation
+from robots.robot import Robot
 from vrs.commands import (
     Alter,
     Cancel,
@@ -92,6 +93,7 @@ class Arm(SettingsInForce):
         self,
         robot: RobotPort,
         *,
+        conventions: ArmConventions | None = None,
         parameters: MutableMapping[str, float] | None = None,
         gripped: Gripped | None = None,
     ) -> None:
@@ -99,13 +101,15 @@ class Arm(SettingsInForce):
 
         Args:
             robot: The robot.
+            conventions: What VAL's numbers mean on it; what they mean on its model alone unless given.
             parameters: Shared with the interpreter; of them HAND.TIME [s] is read.
             gripped: Is told when the hand takes hold of something or lets go [s].
         """
         super().__init__()
         self.robot = robot
         self.parameters: MutableMapping[str, float] = {} if parameters is None else parameters
-        self._frames = Frames(robot.model)
+        bare = Robot(robot.model.name, robot.model)
+        self._frames = Frames(robot.model, conventions=conventions or conventions_of(bare))
         self._frames_since = deque([(-math.inf, self._frames)], maxlen=REMEMBERED)
         """Since when TOOL and BASE have been which [s]."""
         self._hand = Hand(self.parameters, gripped, self._grip if robot.has_fingers else None)
@@ -440,11 +444,11 @@ class Arm(SettingsInForce):
 
     def go_ready(self, *, now: float) -> None:
         """READY."""
-        self._move(READY, False, now)
+        self._move(self._frames.conventions.ready, False, now)
 
     def nest(self, *, now: float) -> None:
         """NEST."""
-        self._move(NEST, False, now)
+        self._move(self._frames.conventions.nest, False, now)
 
     def align(self, *, now: float) -> None:
         """ALIGN: turn the tool's axis to the nearest world axis."""
@@ -586,8 +590,10 @@ class Arm(SettingsInForce):
     def _solved(self, target: Location, near: Array, manner: MotionSettings) -> Array:
         q = self._frames.solve(target, near, manner.words)
         if manner.single and isinstance(target, Transformation):
-            q = np.array(q)
-            q[5] = math.remainder(q[5], 2.0 * math.pi)
+            turned = np.array(q)
+            turned[5] = math.remainder(q[5], 2.0 * math.pi)
+            limits = self.robot.model.limits
+            q = turned if limits.q_min[5] <= turned[5] <= limits.q_max[5] else q
         return q
 
     def _start(self, now: float) -> float | None:
@@ -690,7 +696,19 @@ class Arm(SettingsInForce):
         """Whether FINE is in force, and its percentage."""
         return self.next.fine, self.next.tolerance
 
+    @override
+    def set_configuration(self, word: str) -> None:
+        if not self._frames.conventions.words:
+            said = f"{word}: {self.robot.model.name} has no names of configurations; allowed: MOVE #point"
+            raise ValError("Not available", said)
+        super().set_configuration(word)
+
     # At once.
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of its joints; none where they have numbers alone."""
+        return self._frames.conventions.names
 
     def set_tool(self, tool: Transformation) -> None:
         """TOOL."""

@@ -10,17 +10,8 @@ from typing import Final
 import numpy as np
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.values import (
-    FLANGE,
-    NULL,
-    Location,
-    PrecisionPoint,
-    Transformation,
-    from_base,
-    from_val_joints,
-    to_base,
-    to_val_joints,
-)
+from interfaces.val2.motion.conventions import PUMA, WORDS, ArmConventions
+from interfaces.val2.values import NULL, Location, PrecisionPoint, Transformation
 from vrs.commands import Alter, Frame
 from vrs.errors import InvalidValueError, OutOfLimitsError, UnreachablePoseError
 from vrs.model import Array, RobotModel
@@ -38,12 +29,6 @@ class Where:
     """Opening of the hand [mm]."""
 
 
-READY: Final = PrecisionPoint((0.0, -90.0, 90.0, 0.0, 0.0, 0.0))
-NEST: Final = PrecisionPoint((0.0, -135.0, 180.0, 0.0, 45.0, 0.0))
-"""Ours: the arm folded over its shoulder."""
-AXES: Final = np.diag([-1.0, -1.0, 1.0])
-"""VAL's world axes in the base frame, and its hand's axes in the last link's."""
-_WORDS: Final = (("RIGHTY", "LEFTY"), ("ABOVE", "BELOW"), ("FLIP", "NOFLIP"))
 _MODELS: Final = {"FLIP": "NOFLIP", "NOFLIP": "FLIP"}
 """VAL's FLIP is a negative joint 5, which the model calls NOFLIP."""
 
@@ -73,24 +58,26 @@ class Frames:
     tool: Transformation = NULL
     base: Transformation = NULL
     """Where the robot stands in the world in which locations are."""
+    conventions: ArmConventions = PUMA
 
     def tip(self) -> Array:
         """The tool's tip in the frame of the last link, (4, 4) [m]."""
-        X = np.eye(4)
-        X[:3, :3] = AXES @ self.tool.X[:3, :3]
-        X[:3, 3] = AXES @ (self.tool.X[:3, 3] + (0.0, 0.0, FLANGE)) / 1000.0
-        return X
+        return self.conventions.tip(self.tool)
+
+    def point(self, q: Array) -> PrecisionPoint:
+        """Joints [rad], (6,), as VAL has them."""
+        return self.conventions.point(q, self.model.limits)
 
     def where(self, q: Array, hand: float) -> Where:
         """Where joints [rad], (6,), put the tool."""
-        flange = from_base(self.model.forward(q))
+        flange = self.conventions.flange_at(self.model.forward(q))
         tip = self.base @ flange @ self.tool
-        return Where(tip, to_val_joints(q, self.model.limits), hand)
+        return Where(tip, self.point(q), hand)
 
     def pose(self, place: Transformation) -> Array:
         """Pose of the last link in the robot's base frame, (4, 4) [m], that puts the tool at a place."""
         near = place if self.base is NULL else self.base.inverse() @ place
-        return to_base(near if self.tool is NULL else near @ self.tool.inverse())
+        return self.conventions.link_at(near if self.tool is NULL else near @ self.tool.inverse())
 
     def place(self, location: Location) -> Transformation:
         """The tool at a location."""
@@ -105,7 +92,7 @@ class Frames:
             ValError: If a joint can't go there.
         """
         limits = self.model.limits
-        q = from_val_joints(point, limits)
+        q = self.conventions.joints(point, limits)
         # A limit itself is allowed, whatever the conversion rounds.
         q = np.where(np.abs(q - limits.q_min) < 1e-12, limits.q_min, q)
         q = np.where(np.abs(q - limits.q_max) < 1e-12, limits.q_max, q)
@@ -116,12 +103,10 @@ class Frames:
         try:
             self.model.limits.check(q)
         except OutOfLimitsError as error:
-            low, high = (
-                to_val_joints(edge, self.model.limits).joints[error.joint]
-                for edge in (self.model.limits.q_min, self.model.limits.q_max)
-            )
-            at = to_val_joints(q, self.model.limits).joints[error.joint]
-            text = f"Jt {error.joint + 1} would be at {at:.6g} deg, allowed are {low:.6g} to {high:.6g}"
+            limits = self.model.limits
+            at, low, high = (self.point(one).joints[error.joint] for one in (q, limits.q_min, limits.q_max))
+            named = f" ({self.conventions.names[error.joint]})" if self.conventions.names else ""
+            text = f"Jt {error.joint + 1}{named} would be at {at:.6g} deg, allowed are {low:.6g} to {high:.6g}"
             raise location_error(text) from None
 
     def solve(self, location: Location, near: Array, words: tuple[str, ...]) -> Array:
@@ -143,7 +128,9 @@ class Frames:
                 return self.model.inverse_near(X, near)
             asked = " ".join(_MODELS.get(word, word) for word in words)
             own = self.model.configuration(near).split()
-            kept = " ".join(word for word, pair in zip(own, _WORDS, strict=False) if not set(pair) & set(words))
+            kept = " ".join(
+                word for word, pair in zip(own, self.conventions.words, strict=False) if not set(pair) & set(words)
+            )
             try:
                 return self.model.inverse_near(X, near, f"{asked} {kept}")
             except UnreachablePoseError:
@@ -158,10 +145,10 @@ class Frames:
 
 def with_word(words: tuple[str, ...], word: str) -> tuple[str, ...]:
     """What is asked for of the configuration, with another word; the word before it of the pair is dropped."""
-    for pair in _WORDS:
+    for pair in WORDS:
         if word in pair:
             return (*(other for other in words if other not in pair), word)
-    raise ValError("Illegal value", f"{word}: a configuration is {', '.join(w for pair in _WORDS for w in pair)}")
+    raise ValError("Illegal value", f"{word}: a configuration is {', '.join(w for pair in WORDS for w in pair)}")
 
 
 def aligned(place: Transformation) -> Transformation:
@@ -281,7 +268,7 @@ class Alterations:
         way = np.concatenate([offset.X[:3, 3] / 1000.0, rotation_vector(offset.X[:3, :3])])
         in_world = self.mode is not None and bool(self.mode & WORLD)
         if in_world:
-            R = AXES @ frames.base.X[:3, :3].T
+            R = frames.conventions.X_BW[:3, :3] @ frames.base.X[:3, :3].T
             way = np.concatenate([R @ way[:3], R @ way[3:]])
         frame = Frame.BASE if in_world else Frame.TOOL
         return Alter(way, frame, frames.tip(), stays=self.cumulative)

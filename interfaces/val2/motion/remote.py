@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
     from interfaces.stream.connection import Connection
+    from robots.robot import Robot
 
 _PATIENCE: Final = 2.0
 """How long an answer waits for the edit that it speaks of to come, too [s]: a motion's from its end on."""
@@ -148,17 +149,20 @@ class RemoteRobot(RobotPort):
         self._viewer.close()
 
 
-def remote_robot(connection: Connection) -> RemoteRobot:
+def remote_robot(connection: Connection, robot: Robot) -> RemoteRobot:
     """The robot of a connection, with the limits that its server tells.
 
     Raises:
-        InvalidValueError: If it isn't a PUMA 560, or its timeline doesn't come.
+        InvalidValueError: If it isn't that robot, or its timeline doesn't come.
     """
     from robots import puma560
 
-    welcome = connection.welcome
-    assert isinstance(welcome, Welcome)
-    model = puma560.model(limits=welcome.limits)
-    if welcome.robot != model.name:
-        raise InvalidValueError("robot", welcome.robot, f"{model.name}: VAL-II moves no other")
+    welcome, model = connection.welcome, robot.arm
+    if not isinstance(welcome, Welcome) or welcome.robot != model.name:
+        raise InvalidValueError("robot", model.name, f"the server's, {welcome.robot}: --robot says which that is")
+    if isinstance(model, puma560.Puma560):
+        return RemoteRobot(connection, puma560.model(limits=welcome.limits))
+    mine, its = (np.array([getattr(one, f.name) for f in fields(one)]) for one in (model.limits, welcome.limits))
+    if mine.shape != its.shape or not np.allclose(mine, its, rtol=1e-6, atol=1e-9):
+        raise InvalidValueError("robot", model.name, "of the server's limits: described here as it is there")
     return RemoteRobot(connection, model)

@@ -89,12 +89,23 @@ def test_inputs_that_are_none_are_refused_with_the_line(tmp_path: Path, text: st
         operator(f"inputs:{file}", 0, 0.1)
 
 
-def test_a_run_is_the_same_to_the_last_bit() -> None:
-    case = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", "bare", "slalom", 3, 20.0)
+@pytest.mark.parametrize("robot", ["bare", "ipr@mujoco"])
+def test_a_run_is_the_same_to_the_last_bit(robot: str) -> None:
+    case = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", robot, "slalom", 3, 20.0)
     one, other = run(case), run(case)
     for name in ("t", "real", "measured", "drives", "offset", "estimated"):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
     assert one.compare() == other.compare()
+
+
+def test_the_worlds_agree_on_where_a_robot_drives() -> None:
+    drives = [
+        run(DriveCase("timeline", Transport.DATAGRAMS, "none", robot, "figure-eight", 1, 10.0))
+        for robot in ("ipr@bullet", "ipr@mujoco", "ipr@bare", "bare")
+    ]
+    off = [float(np.hypot(*(one.real - drives[0].real)[:, :2].T).max()) for one in drives]
+    assert 0.0 < off[1] < 5e-3
+    assert np.array_equal(drives[2].real, drives[3].real)
 
 
 def test_without_delay_and_with_the_model_itself_the_twins_agree() -> None:

@@ -23,8 +23,10 @@ from interfaces.lab.papers import papers
 from interfaces.messages.jobs import JobStage
 from robots.bullet.rooms import Person
 from robots.ipr.parameters import IPR
-from robots.mobile.body import Cargo, MobileBody
+from robots.mobile.body import MobileBody
 from robots.mobile.robot import Collision, place
+from robots.simulated import WORLDS
+from robots.vehicle import Cargo
 from vrs.errors import InvalidValueError
 
 
@@ -46,10 +48,15 @@ def test_the_scenario_is_played_to_its_end() -> None:
     assert max(near) < 0.05
 
 
+@pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize(("friction", "stays"), [(0.5, True), (0.005, False)])
-def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bool) -> None:
-    with MobileBody(IPR, (0.0, 0.0, 0.0)) as body:
+def test_friction_holds_a_book_while_the_robot_drives(friction: float, stays: bool, world: str) -> None:
+    with MobileBody(IPR, (0.0, 0.0, 0.0), world=world) as body:
+        body.drive(0.5, 0.0, 240)
+        body.drive(0.0, 0.0, 240)
+        at, _ = body.vehicle.pose()
         body.load(Cargo(friction=friction))
+        assert np.array_equal(body.vehicle.pose()[0], at)
         for k in range(60):
             body.follow(0.5 if k % 20 < 10 else 0.0, 0.7 if k % 20 < 10 else -0.7)
         ((x, y, z),) = body.cargo

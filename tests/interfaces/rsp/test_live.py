@@ -56,7 +56,7 @@ def test_cubo_over_sockets_with_keys(tmp_path: Path, monkeypatch: pytest.MonkeyP
     import cubo  # type: ignore[import-not-found]
 
     keys = tmp_path / "keys"
-    with robot("--token-file", str(keys)) as address:
+    with robot("--token-file", str(keys), "--body", "mujoco") as address:
         assert keys.stat().st_mode & 0o777 == 0o600
         with cubo.connect(address, key_file=keys, timeout=20.0) as mine:
             mine.moving.set_active(True)
@@ -105,6 +105,7 @@ def test_whom_nobody_answers(tmp_path: Path) -> None:
     [
         (["robot", "--rsp", "0.0.0.0:8700"], "--token-file"),
         (["robot", "--rsp", "nowhere"], "--rsp"),
+        (["robot", "--rsp", "127.0.0.1:0", "--body", "jelly"], "body of cubo must be one of"),
         (["robot", "--model", "{tmp}/good.xmi"], "given with --rsp only"),
         (["rsp"], "Missing command"),
         (["robot", "--rsp", "127.0.0.1:0", "--room", "zoo"], "furnished"),

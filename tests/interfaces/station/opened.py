@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from axe_core_python.sync_playwright import Axe
+
 from tests.interfaces.live_rig import Child
 
 SERVE = ("serve", "--body", "ideal", "--link-loss", "hold")
@@ -104,8 +106,15 @@ class Page:
         try:
             until(holds)
         except AssertionError:
-            said = [self.page.locator(name).text_content() for name in ("#bar-panels", "#receipts", "#alert")]
+            said = self.page.locator("#bar-panels, #receipts, .refused, #alert").all_text_contents()
             raise AssertionError(said) from None
+
+    def accessible(self) -> None:
+        """Find no fault that axe finds, light and dark."""
+        for scheme in ("light", "dark"):
+            self.page.emulate_media(color_scheme=scheme)
+            found = Axe().run(self.page)["violations"]
+            assert found == [], [(fault["id"], fault["nodes"][0]["html"]) for fault in found]
 
     def rest(self) -> None:
         """Wait until both robots rest where the plan ends."""

@@ -46,9 +46,12 @@ def test_a_class_joins_waits_and_is_called(browser: Any, taught: tuple[Child, di
     server, tokens = taught
     with paged(browser, station(server)) as teacher:
         teacher.open(live=False)
+        teacher.wait("document.getElementById('door').open")
+        teacher.accessible()
         join(teacher, tokens[Role.ADMIN], "Teacher")
         teacher.page.click("#tab-class")
         teacher.wait("document.querySelectorAll('.invitations img').length === 2")
+        teacher.accessible()
         code = teacher.page.locator("#join-operator .code").text_content()
         link = teacher.page.locator("#join-operator a").get_attribute("href")
         assert code is not None

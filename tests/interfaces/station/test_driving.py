@@ -132,7 +132,7 @@ def test_the_way_is_changed_on_the_fly_and_plots_are_drawn(page: Page) -> None:
 LISTEN = """() => {
   const context = new AudioContext();
   const analyser = context.createAnalyser();
-  context.createMediaStreamSource(station.shared.camera.video.srcObject).connect(analyser);
+  context.createMediaStreamSource(station.camera.video.srcObject).connect(analyser);
   const samples = new Float32Array(analyser.fftSize);
   window.level = () => {
     analyser.getFloatTimeDomainData(samples);
@@ -141,7 +141,7 @@ LISTEN = """() => {
 }"""
 """How loud what arrives is."""
 PIXELS = """() => {
-  const { video } = station.shared.camera;
+  const { video } = station.camera;
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
   const context = canvas.getContext("2d");
@@ -150,7 +150,7 @@ PIXELS = """() => {
   return [canvas.width, canvas.height, at(0.5, 0.4), at(0.5, 0.9)];
 }"""
 """Size of the newest picture, and what is in its middle and at its bottom."""
-CAMERA = "station.shared.camera"
+CAMERA = "station.camera"
 
 
 def test_the_camera_is_seen_by_rtp_turned_and_heard_by_who_has_control_and_its_message_stands(page: Page) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -154,6 +155,20 @@ def test_undo_is_redone(page: Page) -> None:
     clear(page)
 
 
+def test_what_the_hand_is_told_stands_on_everybodys_strip(browser: Any, server: Child, page: Page) -> None:
+    page.take_control().rest()
+    with paged(browser, station(server)) as second:
+        second.open()
+        page.page.click("#hand-close")
+        for seen in (page, second):
+            until(lambda seen=seen: seen.page.locator(".grip").count() == 1)
+            assert "Close the hand, 0:" in (seen.page.locator(".grip").get_attribute("aria-label") or "")
+        page.shoot("grip")
+        page.page.click("#hand-open")
+        until(lambda: second.page.locator(".grip").count() == 2)
+    page.page.click("#give")
+
+
 def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     page.take_control().rest()
     says(page, "#save", "nothing is planned")
@@ -180,6 +195,8 @@ def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     assert spans[2][0] > was[1][1]
     assert spans[3][0] - spans[2][0] == pytest.approx(was[1][0] - was[0][0], abs=1e-6)
     page.page.set_input_files("#plan-file", path)
+    page.page.wait_for_selector("#load-replace")
+    page.accessible()
     page.page.click("#load-replace")
     until(
         lambda: len(scheduled(page)) == 1 or (len(scheduled(page)) == 2 and sorted(scheduled(page).values()) != was)
@@ -197,6 +214,39 @@ def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     page.page.click("#give")
     page.wait("!station.session.holds")
     says(page, "#load", "take control first")
+
+
+def test_a_plan_with_a_via_and_a_rounded_corner_takes_the_same_path_once_loaded(page: Page, tmp_path: Path) -> None:
+    page.take_control().rest()
+    clear(page)
+    move = plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 60, 0.3)
+    page.page.click("#zoom-out")
+    page.page.click("#zoom-out")
+    page.page.locator(f".move[data-id='{move}']").press("Enter")
+    page.page.select_option("#via-place", "stretch")
+    page.page.click("#via")
+    page.page.evaluate("""() => { window.given = station.session.order({ type: 'move', insertion: 'append',
+        speed: 0.4, deviation: 0.1, target: { type: 'joints', q: [0.3, 1.2, -2.2, 0, 0.5, 0] } }, 'corner'); }""")
+    page.wait("Math.abs(station.session.timeline.end - given.outcome?.receipt?.end) < 1e-9")
+    assert page.get("given.outcome.receipt.reason.includes('passes the via within')")
+    path = """(() => { const { timeline, now } = station.session;
+        const { start } = timeline.segments.find(({ start, commandId }) => commandId !== null && start > now);
+        const times = Array.from({ length: 200 }, (_, k) => start + (k * (timeline.end - start)) / 199);
+        return [timeline.end - start, times.map((t) => timeline.joints(t))]; })()"""
+    lasted, was = page.get(path)
+    with page.page.expect_download() as download:
+        page.page.click("#save")
+    saved = tmp_path / "saved.jsonl"
+    download.value.save_as(saved)
+    clear(page)
+    page.page.set_input_files("#plan-file", saved)
+    page.page.click("#load-append")
+    page.wait("station.polite === '3 moves are planned'")
+    until(lambda: len(scheduled(page)) == 3)
+    lasts, found = page.get(path)
+    assert lasts == pytest.approx(lasted, abs=1e-6)
+    assert max(math.dist(*pair) for pair in zip(found, was, strict=True)) < 1e-6
+    clear(page)
 
 
 def test_on_a_phone_all_tools_are_there_without_scrolling(page: Page) -> None:

@@ -14,6 +14,7 @@ from axe_core_python.sync_playwright import Axe
 from robots import mobile
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import Page, paged, station
+from tests.interfaces.station.test_notices import told
 
 SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
 A, B = (4.7, 5.3), (4.8, 6.1, math.pi / 2)
@@ -83,21 +84,30 @@ def test_a_click_on_the_map_sends_the_robot_there_and_a_drag_says_how_it_stands(
     assert math.dist((x, y), (4.65, 5.5)) < 0.08
     assert abs(math.remainder(theta - math.atan2(0.8, -0.25), math.tau)) < math.radians(6)
     page.wait("Boolean(station.session.seen?.points?.length > 20 && station.session.seen.doubt)")
-    # A typed goal in a wall is refused with a reason, and the space bar ends one that's under way.
-    page.page.fill("#goal-x", "4.7")
-    page.page.fill("#goal-y", "4.3")
-    page.page.click("#goal-go")
+    # A typed goal in a wall, or out of the map, is refused with a reason, and doesn't end one that's under way.
+    send(page, 4.7, 4.3)
     page.wait("station.session.tasks.doing === 'goal'")
-    # It isn't ended by one that can't be reached.
-    page.page.fill("#goal-x", "3.6")
-    page.page.fill("#goal-y", "4.0")
-    page.page.click("#goal-go")
-    page.wait("/can't turn|inside a wall/.test(document.getElementById('goal-fault').textContent)")
-    assert page.get("[station.session.tasks.doing, station.session.tasks.goal.y]") == ["goal", 4.3]
+    for x, y, why in ((3.6, 4.0, "inside a wall"), (50.0, 1.0, "outside the map")):
+        send(page, x, y)
+        page.until(lambda why=why: why in page.page.locator("#goal-fault").text_content())
+        told(page, why, "#goal-go")
+        assert page.get("[station.session.tasks.doing, station.session.tasks.goal.y]") == ["goal", 4.3]
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.press("Space")
     page.wait("(station.session.tasks.doing ?? 'nothing') === 'nothing'")
     page.wait("!station.session.state.halted")
+    x, y, _ = real(page)
+    page.until(
+        lambda: f"x {x:.2f} m, y {y:.2f} m, θ" in page.page.locator("#map-robot").text_content().replace("−", "-")
+    )
+    page.page.mouse.move(*on_map(page, 3.0, 2.0))
+    page.until(lambda: "x 3.0" in page.page.locator("#map-pointer").text_content())
+
+
+def send(page: Page, x: float, y: float) -> None:
+    page.page.fill("#goal-x", str(x))
+    page.page.fill("#goal-y", str(y))
+    page.page.click("#goal-go")
 
 
 def add(page: Page, kind: str, text: str) -> None:
@@ -134,12 +144,10 @@ def test_the_papers_scenario_is_listed_tried_and_done(page: Page, kept: Path) ->
     page.page.click("#jobs-dry-run")
     page.wait("station.session.tasks.forecast?.length === 5")
     assert "and what nobody knows" in page.page.locator("#jobs-stage").text_content()
-    page.page.evaluate(
-        "window.said = new Set(); setInterval(() => said.add(station.shared.camera.facts?.saying), 20)"
-    )
+    page.page.evaluate("window.said = new Set(); setInterval(() => said.add(station.camera.facts?.saying), 20)")
     page.page.click("#jobs-run")
     page.wait("station.session.tasks.progress.jobs[3].stage === 'running'")
-    page.wait("!document.getElementById('jobs-key').disabled")
+    page.wait("!document.getElementById('jobs-key').ariaDisabled")
     assert stands_at(page, B)
     assert page.page.locator("#jobs-shows").text_content() == "Please put the book on my top side!"
     page.wait("said.has('Hello!')")

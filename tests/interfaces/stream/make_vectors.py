@@ -321,6 +321,8 @@ def values() -> dict[str, Any]:
         "report with a reference": Report(
             7_730_941_132_801, 5, 2.95, 1, 2.1, 1.0, Q, 2.92, 2.07, None, "", (), None, 1.001 * Q
         ),
+        "hello of a client with programs": c.Hello(c.PROTOCOL, c.Role.OPERATOR, "console", alters=True),
+        "correct another's program": c.PathCorrection(12, 1, np.zeros(6), None, 2.5),
     }  # fmt: skip
 
 

@@ -75,6 +75,11 @@ def found(*lines, sections=""):
         ("SIGNAL 513", "Illegal digital signal", 8),
         ("SIGNAL 1.5", "Illegal digital signal", 8),
         ("BITS 1001, 4 = 5", "Illegal digital signal", 6),
+        ("BITS 1 = 5", "Illegal value", 1),
+        ("BITS 1, 2 = 4", "Illegal value", 1),
+        ("OPEN -5", "Value out of range", 6),
+        ("CLOSEI -0.5", "Value out of range", 8),
+        ("x = STATUS(main)", "Mixed types", 12),
         ("IGNORE 0", "Illegal digital signal", 8),
         ("REACT -1513", "Illegal digital signal", 7),
         ("TIMER 16 = 0", "Value out of range", 7),
@@ -104,6 +109,7 @@ def test_mistakes_are_found_where_they_are(line, what, column):
         ['$a = "x" + "y"', 'IF $a == "xy" GOTO 1', "1 TYPE $a, /F8.2, 3, NULL"],
         ["SIGNAL 0, -2001", "WAIT SIG(1001, -2)", "DELAY 0", "x = 1", "SIGNAL -x"],
         ["a = 1", "CASE a OF", "VALUE 1, 2:", "ANY", "END"],
+        ["BITS 1 = 1", "BITS 1, 3 = 7", "n = 3", "BITS 1, n = 7", "OPEN 0", "CLOSE n"],
     ],
 )
 def test_sound_programs_are_left_alone(lines):
@@ -153,6 +159,23 @@ def test_what_has_no_meaning_here_is_a_warning():
     assert [(severity, what, line) for severity, what, _, line, _ in rows] == [
         ("warning", "No meaning here", line) for line in (2, 3, 4)
     ]
+
+
+def test_a_variable_that_looks_like_an_instruction_is_a_warning():
+    assert found("BITS = 7", "bits = BITS(1, 8)", "TYPE bits") == [
+        ("warning", "Looks like an instruction", "a variable is set; of signals: BITS first[, count] = value", 2, 1)
+    ]
+
+
+def test_an_unknown_word_that_begins_like_a_structure_leaves_those_around_it_whole():
+    assert [f[1:4:2] for f in found("IF 1 == 2 THEN", 'WIBBLE 3, "x"', "END")] == [("Undefined instruction", 3)]
+    assert [f[1:4:2] for f in found("WHLE 1 == 2 DO", "END")] == [("Undefined instruction", 2)]
+
+
+def test_a_function_without_its_arguments_is_told_by_its_form():
+    assert [f[1:3] for f in found("x = ADC", "y = STATUS(main)")] == [
+        ("Undefined value", "adc; the function is ADC(channel)"), ("Mixed types", "a string is wanted"),
+    ]  # fmt: skip
 
 
 def test_what_is_read_of_a_file_counts_as_set():
@@ -215,7 +238,8 @@ def test_vrs_check_says_what_is_wrong_and_exits_2(tmp_path, capsys):
     said = capsys.readouterr().out.splitlines()
     assert said == [
         f"{path}:2:8: error: *Undefined location* p; nothing in the file sets it (program main, step 1)",
-        f"{path}:3:2: warning: *No meaning here* SELECT 3 is passed over (program main, step 2)",
+        f"{path}:3:2: warning: *No meaning here* SELECT 3 is passed over: there is one robot"
+        " (program main, step 2)",
         "1 error, 1 warning.",
     ]
     assert exit_code("check", str(path), "--json") == 2

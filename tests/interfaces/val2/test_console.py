@@ -352,6 +352,29 @@ def test_a_terminal_alone(session, tmp_path):
     assert "execute loop" in (tmp_path / "state" / "vrs-teleop" / "console").read_text()
 
 
+def test_files_that_programs_write_are_listed_renamed_and_deleted_by_where_they_are(session, tmp_path):
+    (tmp_path / "ask.v2").write_text(
+        'READ (4) $name\nATTACH (5) "DISK"\nFOPENW (5) "names.txt"\nWRITE (5) $name\nFCLOSE (5)\n'
+        "WRITE (4) $ERROR(IOSTAT(4))\n"
+    )
+    (tmp_path.parent / "outside.v2").write_text("READY\n")
+    console = session("--alone")
+    console.until(r"HELP lists the commands")
+    console.press("load ask\rex ask\rfred\r")
+    console.until(r"\*Success\*\s[^\n]*\n?[^\n]*ask has ended")
+    assert (tmp_path / "names.txt").read_text() == "fred\n"
+    console.press("flist\r")
+    console.until(r"ask +names\.txt")
+    console.press("frename who.txt=names.txt\rfrename =who.txt\r")
+    console.until(r"\*Missing argument\* a file's name")
+    console.press("fdelete who.txt\ry\rfdelete ../outside\r")
+    console.until(rf"Delete {re.escape(str(tmp_path.parent / 'outside.v2'))} \(Y/N\)")
+    console.press("n\rfdelete who.txt\r")
+    console.until(r"\*Nonexistent file\* who\.txt")
+    assert {path.name for path in tmp_path.iterdir()} == {"ask.v2", "state"}
+    assert (tmp_path.parent / "outside.v2").exists()
+
+
 def test_a_terminal_with_both_robots(session):
     console = session()
     console.until(r"http://127\.0\.0\.1:\d+/view")

@@ -6,12 +6,12 @@ import pytest
 
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands
-from interfaces.val2.monitor.control import ControlState
+from interfaces.val2.monitor.control import Control, ControlState
 
 from .sitting import ASK, HELLO, LOOP, Sitting
 
 
-class Held:
+class Held(Control):
     """Control that somebody else has, or that takes time to come; of a robot that may be in trouble."""
 
     fault_poll_interval = 0.1

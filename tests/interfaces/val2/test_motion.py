@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from interfaces.val2.errors import ValError
-from interfaces.val2.motion.places import NEST, READY, Frames, aligned, with_word
-from interfaces.val2.values import NULL, PrecisionPoint, to_val_joints
+from interfaces.val2.motion.conventions import PUMA
+from interfaces.val2.motion.places import Frames, aligned, with_word
+from interfaces.val2.values import NULL, PrecisionPoint
 from robots import puma560
 from tests.interfaces.val2.bench import DOWN, MODEL, SQUARE, Bench, close, from_oat, to_oat
 from vrs import Status
@@ -23,7 +24,7 @@ def test_ready_reads_as_the_arm_straight_up():
     where = bench.here()
     assert to_oat(where.tool)[:3] == pytest.approx((-20.3, 150.05, 863.6 + 56.25), abs=0.05)
     assert to_oat(where.tool)[3:] == pytest.approx((90.0, -90.0, 0.0), abs=0.01)
-    assert where.joints.joints == pytest.approx(READY.joints, abs=1e-9)
+    assert where.joints.joints == pytest.approx(PUMA.ready.joints, abs=1e-9)
 
 
 def test_ready_and_nest_dont_depend_on_the_configuration():
@@ -32,10 +33,10 @@ def test_ready_and_nest_dont_depend_on_the_configuration():
         bench.arm.set_configuration(word)
         bench.arm.go_ready(now=0.0)
         bench.settle()
-        assert bench.here().joints.joints == pytest.approx(READY.joints, abs=1e-9)
+        assert bench.here().joints.joints == pytest.approx(PUMA.ready.joints, abs=1e-9)
         bench.arm.nest(now=bench.now)
         bench.settle()
-        assert bench.here().joints.joints == pytest.approx(NEST.joints, abs=1e-9)
+        assert bench.here().joints.joints == pytest.approx(PUMA.nest.joints, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +205,7 @@ def test_a_joint_may_stand_at_its_limit_and_no_farther(end, share):
         for turn in (0.0, 1e-6, -1e-6):
             q = np.zeros(6)
             q[k] = getattr(limits, end)[k] + turn
-            point = to_val_joints(q, limits)
+            point = PUMA.point(q, limits)
             if limits.q_min[k] <= q[k] <= limits.q_max[k]:
                 assert frames.joints(point) == pytest.approx(q, abs=1e-12)
                 limits.check(frames.joints(point))

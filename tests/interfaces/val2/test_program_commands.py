@@ -54,7 +54,7 @@ def test_what_has_no_meaning_is_a_warning_once() -> None:
     rig = Rig()
     rig.run(body("FOR i = 1 TO 3", "SELECT ROBOT = 1", "END", "TYPE 1"))
     (warning,) = (e for _, e in rig.when(Warned))
-    assert warning == Warned("SELECT has no meaning here: program main, step 2")
+    assert warning == Warned("SELECT is passed over: there is one robot, program main, step 2")
 
 
 def test_cycles() -> None:

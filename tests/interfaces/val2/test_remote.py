@@ -16,7 +16,7 @@ from interfaces.teleop import OperatorSite, RobotSiteConfig, VirtualArm
 from interfaces.teleop.operator import Halt, HaltCause
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, arm_for
-from interfaces.val2.motion.places import READY
+from interfaces.val2.motion.conventions import PUMA
 from interfaces.val2.motion.remote import RemoteRobot
 from tests.interfaces.joined import MODEL, Joined, bad, constant
 from tests.interfaces.live_rig import operator_here, robot_here
@@ -113,7 +113,7 @@ def test_answers_come_later_and_the_motions_are_the_same(line):
     line.until(arm.settled)
     assert off(arm, CORNER, line.now) < 1e-9
     assert np.abs(line.joined.engine.joints(line.now) - line.joined.engine.timeline.final()).max() == 0.0
-    assert arm.real(now=line.now).joints.joints == pytest.approx(READY.joints)
+    assert arm.real(now=line.now).joints.joints == pytest.approx(PUMA.ready.joints)
 
 
 def test_what_is_refused_raises_once_and_changes_nothing(line):

@@ -10,10 +10,10 @@ import pytest
 from interfaces.cli import main
 from interfaces.link import delay_profile
 from interfaces.val2.errors import ValError
+from interfaces.val2.motion.conventions import PUMA
 from interfaces.val2.playing import Listeners, rehearse
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from interfaces.val2.values import from_base
 from robots import load
 from robots.robot import exact_arm
 
@@ -42,7 +42,7 @@ def vrs(*arguments):
 def test_the_first_program_runs_once_from_nominal():
     text = program("CALL other", "SET p = HERE", "TYPE DX(p)") + program("TYPE /I0, 7", name="other")
     played, typed, _ = twins(text)
-    expected = from_base(model.forward(model.poses["nominal"])).X[0, 3]
+    expected = PUMA.flange_at(model.forward(model.poses["nominal"])).X[0, 3]
     assert typed.split()[0] == "7"
     assert float(typed.split()[1]) == pytest.approx(expected, abs=0.01)
     assert played.error is None

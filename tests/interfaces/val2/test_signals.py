@@ -60,6 +60,7 @@ def test_bits_turn_a_group_of_signals() -> None:
     ("line", "said"),
     [
         ("BITS 1, 3 = 8", "*Illegal value* 8: 0 to 7 for 3 signals"),
+        ("BITS 1 = 5", "*Illegal value* 5: 0 to 1 for 1 signal; allowed too: BITS first, count = value"),
         ("BITS 1, 3 = 0.5", "*Illegal value* 0.5: 0 to 7 for 3 signals"),
         ("BITS 1, 3 = -1", "*Illegal value* -1: 0 to 7 for 3 signals"),
         ("BITS 1, 33 = 0", "*Illegal value* 33: 1 to 32 signals"),

@@ -137,9 +137,13 @@ def test_joints_reals_and_strings_come_back_exactly(joints, real, text):
 def test_files_of_v_plus_have_other_comments_and_step_numbers():
     text = (
         "# demo\n.PROGRAM main() # x\n  1.  MOVE #p\n  2.\n.END\n.LOCATIONS\n# six\n#p 1 2 3 4 5 6 # joints\n.END\n"
+        ".REALS\n# one\nn 3\n.END # of it\n"
     )
-    source = parse_file(text, "f")
-    assert print_file(source) == (".PROGRAM main() ; x\n      MOVE #p\n\n.END\n.LOCATIONS\n#p 1 2 3 4 5 6\n.END\n")
+    wanted = ".PROGRAM main() ; x\n      MOVE #p\n\n.END\n.LOCATIONS\n#p 1 2 3 4 5 6\n.END\n.REALS\nn 3\n.END\n"
+    assert print_file(parse_file(text, "f")) == wanted
+    # Without a blank behind it, too, but where a line of values begins: `#six` may be a location there.
+    tight = text.replace("# six\n", "").replace("# one\n", "").replace("# ", "#")
+    assert print_file(parse_file(tight, "f")) == wanted.replace("; x", ";x")
 
 
 def test_upright_poses_are_printed_with_o_90():

@@ -108,7 +108,7 @@ TIMED = (
 OTHERS = (
     "SET", "DECOMPOSE", "SHIFT", "REACT", "REACTI", "IF", "ELSE", "END", "WHILE", "DO", "UNTIL", "FOR", "CASE",
     "VALUE", "ANY", "EXIT", "NEXT", "GOTO", "CALL", "GOSUB", "RETURN", "TYPE", "PROMPT", "REMARK", "AUTO", "LOCAL",
-    "GLOBAL",
+    "GLOBAL", "EXECUTE", "PCEXECUTE", "PRIME",
 )  # fmt: skip
 """What is made by `statements` below."""
 
@@ -188,6 +188,13 @@ statements = st.one_of(
         expressions,
         program=st.just("") | programs_called,
         words=st.sampled_from([(), ("ALWAYS",)]),
+    ),
+    st.builds(
+        lambda keyword, before, given, called: Instruction(keyword, (*before, *given), program=called),
+        st.sampled_from(["EXECUTE", "PCEXECUTE", "PRIME"]),
+        st.tuples(st.none() | counts.map(lambda n: Number(float(n))), optional, optional),
+        st.lists(optional, max_size=3).filter(lambda given: given != [None]),
+        programs_called,
     ),
     many(["TYPE"], st.lists(expressions | formats, max_size=4)),
     st.builds(

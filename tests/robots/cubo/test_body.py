@@ -4,17 +4,32 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from robots.bullet.vehicle import BulletVehicle
 from robots.cubo import parameters as p
 from robots.cubo.body import COMMANDS, MEASURES, MOVES, CuboBody
 from robots.cubo.shapes import shapes
-from robots.mobile.body import DRIVES
 from robots.mobile.chassis import MobileReality
 from robots.mobile.shapes import links
+from robots.simulated import WORLDS
 from vrs.errors import InvalidValueError
+
+WORLD = [""]
+
+
+@pytest.fixture(autouse=True, params=WORLDS)
+def _world(request: pytest.FixtureRequest) -> None:
+    """It does what its bindings say in each world."""
+    WORLD[0] = request.param
+
+
+def cubo(*given: Any, **named: Any) -> CuboBody:
+    return CuboBody(*given, **named, world=WORLD[0])
+
 
 IDEAL = replace(MobileReality.ideal(), ramps=True)
 
@@ -48,23 +63,23 @@ def test_every_shape_is_closed_and_faces_outwards() -> None:
 
 
 def test_what_pybullet_has_is_what_the_parameters_say() -> None:
-    with CuboBody() as body:
-        bullet = body.world.bullet
-        mass = sum(bullet.getDynamicsInfo(body.body_id, j)[0] for j in range(-1, 6))
+    with CuboBody(world="bullet") as body:
+        assert isinstance(body.vehicle, BulletVehicle)
+        bullet, number = body.vehicle.world.bullet, body.vehicle.body
+        mass = sum(bullet.getDynamicsInfo(number, j)[0] for j in range(-1, 6))
         assert mass == pytest.approx(2.0, rel=1e-6)
-        for number, limb in enumerate(p.CUBO.limbs):
-            info = bullet.getDynamicsInfo(body.body_id, 3 + number)
+        for k, limb in enumerate(p.CUBO.limbs):
+            info = bullet.getDynamicsInfo(number, 3 + k)
             assert info[0] == pytest.approx(limb.mass)
             assert info[2] == pytest.approx(limb.inertia(), rel=1e-6)
             assert info[3] == pytest.approx(limb.centre, abs=1e-9)
         loads = [wheel.load for wheel in body.wheels]
         assert loads[0] == pytest.approx(loads[1], rel=0.01)
         assert 0.7 * 2.0 * 9.81 < sum(loads) < 2.0 * 9.81
-        assert tuple(DRIVES) == (0, 1)
 
 
 def test_it_drives_where_the_rims_say() -> None:
-    with CuboBody((0, 0, 0), reality=IDEAL, exact=True) as body:
+    with cubo((0, 0, 0), reality=IDEAL, exact=True) as body:
         body.move("wheels", (0.2, 0.2))
         body.go_on(120)
         start = body.truth[0]
@@ -85,7 +100,7 @@ def test_it_drives_where_the_rims_say() -> None:
 
 
 def test_it_brakes_from_full_speed_without_a_nod() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         body.move("wheels", (0.4, 0.4))
         body.go_on(240)
         body.move("wheels", (-0.4, -0.4))
@@ -95,7 +110,7 @@ def test_it_brakes_from_full_speed_without_a_nod() -> None:
 
 
 def test_arms_and_head_go_where_they_are_told_as_fast_as_they_are_told() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         body.move("arm.left", (1.2, 1.0))
         body.move("arm.right", (9.0,))
         body.move("tilt", (-9.0, 0.0))
@@ -107,7 +122,7 @@ def test_arms_and_head_go_where_they_are_told_as_fast_as_they_are_told() -> None
 
 
 def test_a_stop_stops_wheels_arms_and_head_where_they_are() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         body.move("wheels", (0.1, 0.1))
         for binding in ("arm.left", "arm.right", "tilt"):
             body.move(binding, (1.5, 0.5))
@@ -122,7 +137,7 @@ def test_a_stop_stops_wheels_arms_and_head_where_they_are() -> None:
 
 
 def test_limbs_hold_their_posture_while_it_drives() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         body.move("wheels", (0.3, 0.1))
         for _ in range(20):
             body.go_on(24)
@@ -130,7 +145,7 @@ def test_limbs_hold_their_posture_while_it_drives() -> None:
 
 
 def test_it_senses_a_wall_touches_it_and_says_so() -> None:
-    with CuboBody(room="furnished") as body:
+    with cubo(room="furnished") as body:
         body.move("wheels", (0.3, 0.3))
         nearest, happened = 1.0, []
         for _ in range(400):
@@ -143,14 +158,14 @@ def test_it_senses_a_wall_touches_it_and_says_so() -> None:
 
 
 def test_where_nothing_is_proximity_says_its_reach() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         assert body.measure("proximity") == (0.8,) * 8
         body.go_on(240)
         assert body.measure("proximity") == (0.8,) * 8
 
 
 def test_the_battery_runs_down_faster_under_load() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         full = body.measure("battery")[0]
         body.go_on(480)
         idle = full - body.measure("battery")[0]
@@ -162,7 +177,7 @@ def test_the_battery_runs_down_faster_under_load() -> None:
 
 
 def test_commands_buttons_and_bindings() -> None:
-    with CuboBody() as body:
+    with cubo() as body:
         body.carry_out("ir", (7.0,))
         body.carry_out("whatever", ())
         assert [(name, values) for _, name, values in body.done] == [("ir", (7.0,)), ("whatever", ())]
@@ -191,7 +206,7 @@ def test_commands_buttons_and_bindings() -> None:
 def test_the_same_seed_gives_the_same_to_the_last_bit() -> None:
     found = []
     for _ in range(2):
-        with CuboBody(rng=4) as body:
+        with cubo(rng=4) as body:
             body.move("wheels", (0.2, 0.15))
             body.move("arm.left", (1.0,))
             body.go_on(480)

@@ -22,7 +22,7 @@ from robots.description.tips import tip_of
 from robots.description.wheels import placed
 from tests.robots.description import tried
 from tests.robots.description.stranger import URDF, write
-from tests.robots.description.tried import BULLET, TOOLBOX
+from tests.robots.description.tried import TOOLBOX, bullet_data
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 
@@ -31,9 +31,9 @@ def test_the_table_of_robots_that_were_tried_is_what_they_give() -> None:
     assert tried.page() == tried.PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("path", tried.ROBOTS.values(), ids=tried.ROBOTS.keys())
-def test_robots_of_pybullet_and_the_toolbox_are_read_whole(path: Path) -> None:
-    found = tried.examined(path)
+@pytest.mark.parametrize("name", tried.ROBOTS)
+def test_robots_of_pybullet_and_the_toolbox_are_read_whole(name: str) -> None:
+    found = tried.examined(name)
     whole = found.description
     assert whole is not None
     assert not [note for note in found.notes if "wasn't found" in note or "can't be read" in note]
@@ -50,12 +50,12 @@ def test_robots_of_pybullet_and_the_toolbox_are_read_whole(path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf", "husky/husky.urdf"])
 def test_links_stand_where_yourdfpy_says(name: str, tmp_path: Path) -> None:
-    text = (BULLET / name).read_text().replace("$(optenv HUSKY_IMU_XYZ 0.19 0 0.149)", "0.19 0 0.149")
+    text = bullet_data(name).read_text().replace("$(optenv HUSKY_IMU_XYZ 0.19 0 0.149)", "0.19 0 0.149")
     (tmp_path / "plain.urdf").write_text(
         text.replace("$(optenv HUSKY_IMU_RPY 0 -1.5708 3.1416)", "0 -1.5708 3.1416")
     )
     oracle = yourdfpy.URDF.load(str(tmp_path / "plain.urdf"), load_meshes=False)
-    description = read(BULLET / name)
+    description = read(bullet_data(name))
     for link, X in placed(description).items():
         low = {joint.name: joint for joint in oracle.robot.joints}
         oracle.update_cfg({name: _rest(low[name]) for name in oracle.actuated_joint_names})
@@ -390,7 +390,7 @@ def test_colours_are_those_of_materials_pictures_and_names(tmp_path: Path) -> No
 
 
 def test_units_of_collada_count() -> None:
-    duck = meshes.read_mesh(BULLET / "duck.dae").mesh
+    duck = meshes.read_mesh(bullet_data("duck.dae")).mesh
     assert np.ptp(duck.vertices, axis=0).max() == pytest.approx(1.6548, rel=1e-3)
 
 
@@ -448,7 +448,7 @@ def test_urdf_is_read_whatever_its_file_is_called_and_mimics_in_a_circle_are_fix
 
 
 def test_husky_is_a_mobile_robot_by_its_wheels() -> None:
-    found = described(str(BULLET / "husky/husky.urdf"))
+    found = described(str(bullet_data("husky/husky.urdf")))
     base = found.robot.base
     assert (base.wheels.base, base.wheels.radius) == pytest.approx((0.5708, 0.1778), abs=1e-4)
     assert base.body.mass == pytest.approx(44.0, abs=0.1)
@@ -462,7 +462,7 @@ def test_husky_is_a_mobile_robot_by_its_wheels() -> None:
     assert (corners.min(axis=0)[:2], corners.max(axis=0)[:2]) == (
         pytest.approx([1 - 0.343, 2 - 0.504], abs=0.015), pytest.approx([1 + 0.343, 2 + 0.504], abs=0.015)
     )  # fmt: skip
-    assert load(str(BULLET / "husky/husky.urdf") + "#front_left_wheel_link").arm.limits.dof == 1
+    assert load(str(bullet_data("husky/husky.urdf")) + "#front_left_wheel_link").arm.limits.dof == 1
 
 
 def test_a_base_in_numbers_is_whole_and_what_is_stated_counts(tmp_path: Path) -> None:
@@ -475,7 +475,7 @@ def test_a_base_in_numbers_is_whole_and_what_is_stated_counts(tmp_path: Path) ->
     assert same.name == "cart"
     assert same.base.limits == robot.base.limits
     assert load(same.found_by).base.wheels == same.base.wheels
-    shutil.copy(BULLET / "husky/husky.urdf", tmp_path / "husky.urdf")
+    shutil.copy(bullet_data("husky/husky.urdf"), tmp_path / "husky.urdf")
     (tmp_path / "husky.vrs.toml").write_text("[base]\nwheel = 0.165\nw = 1.5\n")
     stated = load(str(tmp_path / "husky.urdf"))
     assert (stated.base.wheels.radius, stated.base.limits.w_max) == (0.165, 1.5)

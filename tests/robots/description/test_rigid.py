@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from robots.description.assumptions import SPEED_TIME, completed
 from robots.description.description import Description, Joint, JointKind, Link, Mimic
 from robots.description.rigid import rigid_chain
 from vrs.model import Array
@@ -91,3 +92,32 @@ def test_efforts_and_drives_are_those_that_are_said() -> None:
     chain = rigid_chain(replace(description, joints=joints), "hand")
     assert [link.effort for link in chain.links] == [50, np.inf, 9]
     assert [link.armature for link in chain.links] == [0.3, 0.0, 0.0]
+
+
+def weak(effort: float | None, acceleration: float | None = None) -> Description:
+    """The arm with another effort of its slide."""
+    description = arm()
+    said = {"effort": effort, "qdd_max": acceleration}
+    joints = (replace(joint, **said) if joint.name == "rail" else joint for joint in description.joints)
+    return replace(description, joints=tuple(joints))
+
+
+def test_accelerations_that_are_assumed_are_such_as_the_efforts_give() -> None:
+    done = completed(weak(18.0), "hand")
+    moving = [joint for joint in done.chain("hand") if joint.moves]
+    effort = np.array([joint.effort for joint in moving])
+    low, high, speed, acceleration = np.array([(j.q_min, j.q_max, j.qd_max, j.qdd_max) for j in moving]).T
+    times = speed / acceleration
+    assert times.max() == pytest.approx(times.min())
+    assert times[0] > 1.2 * SPEED_TIME
+    assert any(f"reached in {times[0]:g} s, as the efforts don't give more" in note for note in done.notes)
+    rng = np.random.default_rng(5)
+    q, qd = rng.uniform(low, high, (500, 3)), rng.uniform(-speed, speed, (500, 3))
+    qdd = acceleration * rng.choice([-1, 1], (500, 3))
+    asked = np.abs(rigid_chain(done, "hand").inverse_dynamics(q, qd, qdd, gravity=done.gravity))
+    assert (asked <= effort).all(axis=1).mean() > 0.9
+    for description in (weak(None), weak(8000.0)):
+        done = completed(description, "hand")
+        assert [j.qd_max / j.qdd_max for j in done.chain("hand") if j.moves] == pytest.approx([SPEED_TIME] * 3)
+    stated = next(joint for joint in completed(weak(18.0, 3.0), "hand").joints if joint.name == "rail")
+    assert stated.qdd_max == 3.0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -12,14 +14,29 @@ import trimesh
 
 from robots import ipr
 from robots.bullet.rooms import read_room
+from robots.bullet.vehicle import BulletVehicle
 from robots.bullet.world import LostError, WorldClosedError
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import CameraModel, Chassis, MobileReality, Senses, SonarModel
-from robots.mobile.robot import BareBody
-from robots.simulated import Payload
+from robots.mobile.robot import BareBody, MobileRobot
+from robots.robot import BARE, load
+from robots.simulated import WORLDS, Payload
 from vrs.errors import InvalidValueError
 from vrs.model import Array
+
+WORLD = [""]
+
+
+@pytest.fixture(autouse=True, params=WORLDS)
+def _world(request: pytest.FixtureRequest) -> None:
+    """Every law of this module holds in each world."""
+    WORLD[0] = request.param
+
+
+def simulated(*given: Any, **named: Any) -> MobileBody:
+    return MobileBody(*given, **named, world=WORLD[0])
+
 
 BLIND = Senses(sonar=None, camera=None)
 IDEAL = replace(MobileReality.ideal(), ramps=True, servo_lag=True)
@@ -40,7 +57,7 @@ def driven(
 ) -> tuple[Array, Array]:
     """Postures of the simulated and of the bare robot after a way and a stop."""
     ends = []
-    for make in (MobileBody, BareBody):
+    for make in (simulated, BareBody):
         with make(chassis, START, reality=reality, senses=BLIND) as body:
             body.drive(v, w, round(seconds / reality.dt))
             body.drive(0.0, 0.0, round(2.0 / reality.dt))
@@ -61,7 +78,7 @@ def test_with_errors_off_it_goes_the_exact_arcs_and_stops_where_they_end(chassis
 
 @pytest.mark.parametrize("chassis", [IPR, MICRO])
 def test_it_begins_where_it_is_put_at_rest(chassis: Chassis) -> None:
-    with MobileBody(chassis, START, reality=MobileReality(encoder_counts=None)) as body:
+    with simulated(chassis, START, reality=MobileReality(encoder_counts=None)) as body:
         assert body.posture == pytest.approx(START, abs=1e-7)
         assert body.time == 0.0
         assert body.encoders == (0.0, 0.0)
@@ -92,7 +109,7 @@ def test_what_is_wrong_with_the_wheels_does_what_it_does_to_the_bare_robot() -> 
 
 def test_shafts_turn_as_told_whatever_the_casters_take() -> None:
     ends = []
-    for make in (MobileBody, BareBody):
+    for make in (simulated, BareBody):
         with make(IPR, START, reality=replace(IDEAL, rolling=20.0), senses=BLIND) as body:
             body.drive(0.3, 0.5, 720)
             ends.append(body.odometry)
@@ -133,11 +150,18 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
     )  # fmt: skip
     assert (part.mass, part.wheel_base, part.wheel_radius) == (body.mass, wheels.base, wheels.radius)
     assert part.limits == model.limits
-    # PyBullet has what it was given: it drops inertias silently when a call names damping, too.
-    with MobileBody(chassis, START, senses=BLIND) as robot:
-        bullet = robot.world.bullet
-        told = [bullet.getDynamicsInfo(robot.body_id, j) for j in range(-1, bullet.getNumJoints(robot.body_id))]
-    assert sum(row[0] for row in told) == pytest.approx(total, rel=1e-9)
+
+
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_pybullet_has_what_it_was_given(chassis: Chassis) -> None:
+    # It drops inertias silently when a call names damping, too.
+    part, (_, _, inertia) = chassis, measured_mass(chassis)
+    with MobileBody(chassis, START, senses=BLIND, world="bullet") as robot:
+        vehicle = robot.vehicle
+        assert isinstance(vehicle, BulletVehicle)
+        bullet, number = vehicle.world.bullet, vehicle.body
+        told = [bullet.getDynamicsInfo(number, j) for j in range(-1, bullet.getNumJoints(number))]
+    assert sum(row[0] for row in told) == pytest.approx(part.mass, rel=1e-9)
     assert sorted(told[0][2]) == pytest.approx(sorted(np.linalg.eigvalsh(inertia)), rel=1e-9)
     spin = part.wheel_mass * part.wheel_radius**2 / 2 + part.gear**2 * part.rotor
     for row in told[1:3]:
@@ -146,19 +170,22 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
 
 
 @pytest.mark.parametrize("chassis", [IPR, MICRO])
-def test_the_floor_bears_the_weight_and_the_driven_wheels_most_of_it(chassis: Chassis) -> None:
-    with MobileBody(chassis, START, reality=IDEAL, senses=BLIND) as body:
+def test_wheels_bear_what_the_casters_leave_of_the_weight(chassis: Chassis) -> None:
+    # By the lever: moments about the axle, of all masses and of what the casters bear behind it.
+    lumps, centre, _ = chassis.rigid()
+    leaning = [x for x, _ in chassis.casters if x < 0]
+    swung = [x - 0.5 * chassis.caster_trail for x, _ in chassis.casters]
+    moment = lumps * centre[0] + chassis.caster_mass * sum(swung)
+    borne = moment / (np.mean(leaning) - chassis.caster_trail)
+    with simulated(chassis, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.3, 0.0, 480)
-        bullet = body.world.bullet
-        points = bullet.getContactPoints(bodyA=body.body_id)
-        weight = body.chassis.mass * 9.81
-        assert sum(point[9] for point in points) == pytest.approx(weight, rel=0.01)
-        assert sum(wheel.load for wheel in body.wheels) > 0.6 * weight
+        loads = [wheel.load for wheel in body.wheels]
+    assert sum(loads) == pytest.approx((chassis.mass - borne) * 9.81, rel=0.01)
 
 
 def start(v: float, w: float, reality: MobileReality = IDEAL) -> tuple[Any, Any]:
     """Wheels of the IPR while it speeds up, averaged over half a second, and long after."""
-    with MobileBody(IPR, START, reality=reality, senses=BLIND) as body:
+    with simulated(IPR, START, reality=reality, senses=BLIND) as body:
         body.drive(v, w, 60)
         early = []
         for _ in range(120):
@@ -196,7 +223,7 @@ def test_torques_are_newtons() -> None:
 
 
 def test_work_becomes_energy_of_motion() -> None:
-    with MobileBody(IPR, START, reality=IDEAL, senses=BLIND) as body:
+    with simulated(IPR, START, reality=IDEAL, senses=BLIND) as body:
         work = 0.0
         for _ in range(300):
             body.drive(0.5, 0.0)
@@ -209,7 +236,7 @@ def test_work_becomes_energy_of_motion() -> None:
 
 def test_it_never_tips_nor_slides_within_the_limits() -> None:
     for chassis, most in ((IPR, 0.004), (MICRO, 0.025)):
-        with MobileBody(chassis, START, senses=BLIND, rng=1) as body:
+        with simulated(chassis, START, senses=BLIND, rng=1) as body:
             rng = np.random.default_rng(2)
             tilt, before = 0.0, body.motion
             for k in range(60):
@@ -226,23 +253,76 @@ def test_it_never_tips_nor_slides_within_the_limits() -> None:
 
 def test_weak_drives_and_a_slippery_floor_fall_behind_and_say_nothing_wrong() -> None:
     weak = replace(IPR, torque=1.0)
-    with MobileBody(weak, START, reality=replace(IDEAL, torque_limits=True), senses=BLIND) as body:
+    with simulated(weak, START, reality=replace(IDEAL, torque_limits=True), senses=BLIND) as body:
         body.drive(0.5, 0.0, 120)
         assert max(abs(wheel.torque) for wheel in body.wheels) <= 1.0 + 1e-9
         assert body.motion[0] < 0.16
     icy = replace(IDEAL, friction=0.02)
-    with MobileBody(IPR, (0, 0, 0), reality=icy, senses=BLIND) as body:
+    with simulated(IPR, (0, 0, 0), reality=icy, senses=BLIND) as body:
         body.drive(0.5, 0.0, 240)
         # Less than μ g on three quarters of the weight is left of 0.52 m/s²; the wheels turn on.
         assert body.posture[0] < 0.12
         assert body.odometry[0] > 0.2
 
 
+@pytest.mark.parametrize("friction", [0.05, 0.1])
+@pytest.mark.parametrize("chassis", [IPR, MICRO])
+def test_locked_wheels_brake_as_coulomb_says(chassis: Chassis, friction: float) -> None:
+    # Three equations: what wheels and casters bear, as braking tips the robot forwards, and the deceleration.
+    # Trailing casters roll, and have half a wheel's inertia; balls slide.
+    reality, r = replace(MobileReality.ideal(), friction=friction), chassis.caster_radius
+    lumps, (x, _, z), _ = chassis.rigid()
+    trail, half, n = chassis.caster_trail, 0.5 * chassis.caster_mass, len(chassis.casters)
+    behind = np.mean([x for x, _ in chassis.casters if x < 0]) - trail
+    swung = sum(2 * x - trail for x, _ in chassis.casters)
+    mass, moment = chassis.mass, lumps * x + half * swung
+    height = (
+        lumps * z + 2 * chassis.wheel_mass * chassis.wheel_radius + n * half * (3 * r if trail else 2 * r)
+    ) / mass
+    rows = [
+        [1.0, 1.0, 0.0],
+        [0.0, -behind, mass * height],
+        [friction, 0.0 if trail else 0.02, -mass - (0.5 * n * half if trail else 0.0)],
+    ]
+    *_, slowing = np.linalg.solve(rows, [mass * 9.81, -moment * 9.81, 0.0])
+    with simulated(chassis, (0, 0, 0), reality=reality, senses=BLIND) as body:
+        for v in np.linspace(0.0, 0.5, round(240 * 0.5 / (0.25 * friction * 9.81))):
+            body.drive(float(v), 0.0)
+        begun, (v, _) = body.posture[0], body.motion
+        body.drive(0.0, 0.0, 720)
+        assert body.posture[0] - begun == pytest.approx(v * v / (2 * slowing), rel=0.06)
+        assert v == pytest.approx(0.5, abs=0.01)
+
+
+def test_drives_at_their_limit_speed_up_a_load_as_newton_says() -> None:
+    weak = replace(IPR, torque=1.5)
+    gone = []
+    for payload in (None, Payload(37.5, (-0.06, 0.0, 0.3))):
+        with simulated(weak, (0, 0, 0), reality=replace(IDEAL, torque_limits=True, payload=payload)) as body:
+            body.drive(0.5, 0.0, 120)
+            gone.append(body.motion[0])
+    spin = 2 * (IPR.wheel_mass * 0.01 / 2 + IPR.gear**2 * IPR.rotor) / 0.01 + 2 * 0.25 * IPR.caster_mass
+    assert gone[0] / gone[1] == pytest.approx((IPR.mass + 37.5 + spin) / (IPR.mass + spin), rel=0.02)
+
+
+@pytest.mark.parametrize("numbers", ["wheelbase=0.2,wheel=0.05", "wheelbase=0.9,wheel=0.25,mass=300,axle=0.1"])
+def test_bases_of_other_sizes_drive_as_exactly(numbers: str) -> None:
+    robot = load(f"diff:{numbers}")
+    for v, w in ((0.4, 0.0), (0.0, 0.8), (0.3, 0.4)):
+        ends = []
+        for name in (WORLD[0], BARE):
+            with robot.body(name)((0, 0, 0), reality=IDEAL, senses=BLIND) as body:
+                body.drive(v, w, 720)
+                ends.append(body.posture)
+        assert np.hypot(*(ends[0] - ends[1])[:2]) <= 1e-3 + 1.5 * abs(v * w) * 3.0 * 0.5 / 240
+        assert abs(ends[0][2] - ends[1][2]) <= 1e-3
+
+
 def test_a_payload_moves_the_centre_of_mass() -> None:
     behind, before = (Payload(20.0, (x, 0.0, 0.5)) for x in (-0.2, -0.02))
     loads = []
     for payload in (None, behind, before):
-        with MobileBody(IPR, START, reality=replace(IDEAL, payload=payload), senses=BLIND) as body:
+        with simulated(IPR, START, reality=replace(IDEAL, payload=payload), senses=BLIND) as body:
             body.drive(0.2, 0.0, 240)
             loads.append(sum(wheel.load for wheel in body.wheels))
             assert body.posture[1] == pytest.approx(START[1] + (body.posture[0] - 1) * math.tan(0.3), abs=2e-3)
@@ -251,13 +331,13 @@ def test_a_payload_moves_the_centre_of_mass() -> None:
 
 def test_one_that_falls_over_is_lost() -> None:
     heavy = replace(IDEAL, payload=Payload(50.0, (0.5, 0.0, 0.8)))
-    with pytest.raises(LostError, match="fell over at"), MobileBody(IPR, START, reality=heavy) as body:
+    with pytest.raises(LostError, match="fell over at"), simulated(IPR, START, reality=heavy) as body:
         body.drive(0.0, 0.0, 480)
 
 
 def test_it_runs_into_a_wall_and_says_so() -> None:
     room = read_room("room 1\nsize 4 4\nwall 3 0 3 4\nperson 0.25 0,1,3.5 3,1,3.5 5,1,2\n")
-    with MobileBody(IPR, (2.0, 2.0, 0.0), room=room, rng=1) as body:
+    with simulated(IPR, (2.0, 2.0, 0.0), room=room, rng=1) as body:
         body.drive(0.5, 0.0, 240 * 3)
         assert [c.thing for c in body.collisions] == ["wall in line 3"]
         assert body.touching == "wall in line 3"
@@ -269,16 +349,21 @@ def test_it_runs_into_a_wall_and_says_so() -> None:
         assert body.posture[0] < 2.5
         with pytest.raises(InvalidValueError):
             body.drive(0.6, 0.0)
-    with MobileBody(IPR, (1.0, 2.0, 0.0), room=room, rng=1) as body:
+    with simulated(IPR, (1.0, 2.0, 0.0), room=room, rng=1) as body:
         body.drive(0.0, 0.0, 240 * 5)
         assert [c.thing for c in body.collisions] == ["person in line 4"]
+        # Who goes on to where it stood pushes it away, and comes into it by two steps of his at most.
+        x, y, theta = body.truth
+        off = complex(1.0 - x, 2.0 - y) * cmath.exp(-1j * theta) - IPR.centre_x
+        apart = max(abs(off.real) - IPR.length / 2, 0.0), max(abs(off.imag) - IPR.width / 2, 0.0)
+        assert math.hypot(*apart) == pytest.approx(0.25, abs=0.05)
 
 
 def test_what_comes_and_goes_is_met_only_while_it_stands() -> None:
     room = read_room("room 1\nsize 4 4\nbox 3 2 0.2 2 from=2 until=4\n")
     quiet = Senses(SonarModel(noise=0.0, noise_share=0.0, misses=0.0))
     seen = []
-    with MobileBody(IPR, (1.0, 2.0, 0.0), room=room, senses=quiet) as body:
+    with simulated(IPR, (1.0, 2.0, 0.0), room=room, senses=quiet) as body:
         for _ in range(50):
             body.follow(0.0, 0.0)
             assert body.sonar is not None
@@ -291,7 +376,7 @@ def test_its_sonars_tell_what_the_bare_robots_tell() -> None:
     postures = [(1.0, 1.0, 1.57), (1.6, 3.3, -2.0), (5.2, 2.2, 0.7)]
     for posture in postures:
         scans = []
-        for make in (MobileBody, BareBody):
+        for make in (simulated, BareBody):
             with make(IPR, posture, room="furnished", senses=quiet) as body:
                 body.drive(0.0, 0.0, 1)
                 assert body.sonar is not None
@@ -305,7 +390,7 @@ def test_its_sonars_tell_what_the_bare_robots_tell() -> None:
 def trace(parts: list[int], seed: int) -> bytes:
     found = []
     exact = MobileReality(encoder_counts=None)
-    with MobileBody(IPR, room="furnished", rng=seed, reality=exact) as body:
+    with simulated(IPR, room="furnished", rng=seed, reality=exact) as body:
         for k in range(15):
             for steps in parts:
                 body.drive(0.3, 0.7 * math.sin(k), steps)
@@ -323,16 +408,15 @@ def test_the_same_seed_gives_the_same_to_the_last_bit() -> None:
 
 
 def test_a_closed_robot_is_of_no_use() -> None:
-    body = MobileBody(MICRO, START)
+    body = simulated(MICRO, START)
     body.close()
     body.close()
-    assert body.world.closed
     with pytest.raises(WorldClosedError):
         body.follow(0.1, 0.0)
 
 
-@pytest.mark.parametrize("make", [MobileBody, BareBody])
-def test_who_is_lifted_in_motion_stands_where_he_is_put(make: type[MobileBody] | type[BareBody]) -> None:
+@pytest.mark.parametrize("make", [simulated, BareBody])
+def test_who_is_lifted_in_motion_stands_where_he_is_put(make: Callable[..., MobileRobot]) -> None:
     with make(IPR, START, reality=IDEAL, senses=BLIND) as body:
         body.drive(0.5, 0.3, 480)
         there = (4.0, -1.0, 2.0)

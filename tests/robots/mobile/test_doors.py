@@ -1,4 +1,4 @@
-"""Doors: leaves that turn about their hinge or slide past it, on the plan and in PyBullet alike."""
+"""Doors: leaves that turn about their hinge or slide past it, on the plan and in physics alike."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robots.bullet.rooms import Door, read_room
-from robots.bullet.world import RoomBodies, World
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import place
+from robots.simulated import WORLDS
+from tests.robots.mobile.worlds import in_room
 from vrs.errors import FormatError, InvalidValueError
 
 PLAN = """room 1
@@ -97,22 +98,20 @@ def test_a_leaf_keeps_its_hinge_and_stands_as_long_as_it_says(
     assert abs(ends[1] - ends[0]) <= door.speed * 1e-3 + 1e-9
 
 
-def test_the_plan_and_physics_see_the_same_leaves() -> None:
+@pytest.mark.parametrize("world", WORLDS)
+def test_the_plan_and_physics_see_the_same_leaves(world: str) -> None:
     room = read_room(PLAN)
-    plan, world = FloorPlan(room), World(gravity=9.81, dt=1 / 240)
-    try:
-        bodies = RoomBodies(world, room)
+    plan = FloorPlan(room)
+    with in_room(world, room) as vehicle:
         angles = np.linspace(0, math.tau, 73)
         ways = np.column_stack([np.cos(angles), np.sin(angles)])
         origins = np.tile([2.4, 2.1], (73, 1))
         for t in (0.0, 5.25, 5.6, 6.0, 7.0, 9.3, 12.0, 15.5):
-            bodies.at(t)
-            exact, cast = plan.cast(origins, ways, t, 5.0), bodies.cast(origins, ways, 0.3, 5.0)
+            vehicle.at(t)
+            exact, cast = plan.cast(origins, ways, t, 5.0), vehicle.cast(origins, ways, 0.3, 5.0)
             assert np.array_equal(np.isfinite(exact), np.isfinite(cast))
             seen = np.isfinite(exact)
             assert np.abs(exact[seen] - cast[seen]).max() < 2e-3
-    finally:
-        world.close()
 
 
 def test_the_home_has_rooms_doors_and_the_papers_places() -> None:

@@ -1,4 +1,4 @@
-"""The 2D plan against brute force, and against PyBullet's rays in the same room."""
+"""The 2D plan against brute force, and against the worlds' rays in the same room."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from robots.bullet.rooms import Room, read_room
-from robots.bullet.world import RoomBodies, World
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import PLACES, place
+from robots.simulated import WORLDS
+from tests.robots.mobile.worlds import in_room
 from vrs.model import Array
 
 PLAN = read_room(
@@ -101,23 +102,27 @@ def test_cells_that_things_touch() -> None:
     assert full >= 0.98 * marks.sum()
 
 
+@pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("name", [*PLACES, "mixed"])
-def test_pybullet_sees_the_same(name: str) -> None:
+def test_the_worlds_see_the_same(name: str, world: str) -> None:
     room = PLAN if name == "mixed" else place(name)
     plan = FloorPlan(room, 0.45)
     rng = np.random.default_rng(5)
-    with World(gravity=9.81, dt=1 / 240) as world:
-        bodies = RoomBodies(world, room)
+    with in_room(world, room) as vehicle:
         for t in (0.0, 6.0, 20.0):
-            bodies.at(t)
-            world.bullet.performCollisionDetection()
+            vehicle.at(t)
+            vehicle.step((0.0, 0.0), (0.0, 0.0))
             origins, ways = rays(rng, room, 400)
             free = ~inside(room, origins, t)
             exact = plan.cast(origins[free], ways[free], t, 3.0)
-            seen = bodies.cast(origins[free], ways[free], 0.45, 3.0)
+            seen = vehicle.cast(origins[free], ways[free], 0.45, 3.0)
             both = np.isfinite(exact) & np.isfinite(seen)
             assert both.sum() > 100
             error = np.abs(exact[both] - seen[both])
+            if world == "mujoco":
+                assert error.max() < 1e-9
+                assert (np.isfinite(exact) == np.isfinite(seen)).all()
+                continue
             # PyBullet makes prisms of cylinders.
             assert (error > 5e-3).mean() < 0.01
             if name == "empty":

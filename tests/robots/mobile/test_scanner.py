@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import BareBody, MobileRobot, place
 from robots.onboard.laser import LaserModel
+from robots.simulated import WORLDS
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced
 
@@ -20,7 +23,9 @@ IDEAL = MobileReality.ideal(dt=1 / 60)
 START = (1.2, 1.3, 0.4)
 
 
-def robot(laser: LaserModel, *, seed: int = 0, kind: type[MobileRobot] = BareBody, **more: object) -> MobileRobot:
+def robot(
+    laser: LaserModel, *, seed: int = 0, kind: Callable[..., MobileRobot] = BareBody, **more: object
+) -> MobileRobot:
     senses = Senses(sonar=None, camera=None, laser=laser)
     return kind(IPR, START, room="furnished", senses=senses, rng=seed, **more)
 
@@ -85,9 +90,10 @@ def test_a_laser_changes_nothing_else() -> None:
     assert with_laser.encoders == without.encoders
 
 
-def test_pybullet_sees_the_same_walls() -> None:
+@pytest.mark.parametrize("world", WORLDS)
+def test_physics_sees_the_same_walls(world: str) -> None:
     laser = LaserModel(noise=0.0, dropouts=0.0)
-    with robot(laser, kind=MobileBody) as body:
+    with robot(laser, kind=partial(MobileBody, world=world)) as body:
         body.drive(0.0, 0.0, 12)
         assert body.laser is not None
         seen = np.minimum(body.laser.ranges[::10], 9.0)
@@ -98,8 +104,8 @@ def test_pybullet_sees_the_same_walls() -> None:
     assert np.mean(off < 6e-3) > 0.9
 
 
-@pytest.mark.parametrize("kind", [BareBody, MobileBody])
-def test_a_robot_that_is_carried_off_turns_no_wheel(kind: type[MobileRobot]) -> None:
+@pytest.mark.parametrize("kind", [BareBody, *(partial(MobileBody, world=world) for world in WORLDS)])
+def test_a_robot_that_is_carried_off_turns_no_wheel(kind: Callable[..., MobileRobot]) -> None:
     with robot(LaserModel(), kind=kind) as body:
         body.drive(0.0, 0.0, 12)
         before = body.odometry
