@@ -27,8 +27,8 @@ NEAR: Final = 0.1
 """So near to the course's end he is there: as a share of a step."""
 DONE: Final = 0.5
 """So much of a step may be left where he takes it as made, as a share."""
-STILL: Final = 1e-3
-"""What he sees move less than this in a period is at rest: as a share of a step."""
+STILL: Final = 0.02
+"""What he sees move by less than this is at rest: as a share of a step."""
 SETTLED: Final = 0.3
 """It has to be at rest for so long [s]."""
 
@@ -154,7 +154,7 @@ class Stepper(Follower):
 
 
 class Wheels(Hand):
-    """A mobile robot's: pursuit of a point ahead at a cruising speed; or a turn on the spot, and a straight line."""
+    """A mobile robot's: pursuit of a point ahead at a cruising speed; or a turn on the spot and a line."""
 
     step, ahead, rest = 0.5, 0.35, np.zeros(2)
     cruise: Final = 0.3
