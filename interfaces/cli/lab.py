@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from interfaces.lab.runner import Calls, Made
 
-LOCALIZATION, GOALS = "localization", "goals"
+LOCALIZATION, GOALS, CONTROL = "localization", "goals", "control"
 """What the command line calls them."""
 
 
@@ -46,19 +46,21 @@ def study(
     *,
     as_json: bool,
 ) -> None:
-    """Measure localization or goals, write summary.json, runs.csv and pictures, and show tables or JSON.
+    """Measure something else than architectures, write summary.json, runs.csv and pictures; show tables or JSON.
 
     Args:
-        what: `LOCALIZATION` or `GOALS`.
+        what: `LOCALIZATION`, `GOALS` or `CONTROL`.
         out: Where the files go.
         seed: Of everything random.
-        runs: Rooms in which accuracy is measured, or goals among furniture and doors, 2 to 1000; 30 or 100 if None.
+        runs: Rooms in which accuracy is measured, goals among furniture and doors, or courses, 2 to 1000; 30, 100
+            or 5 if None.
         length: Of a drive in a room [s]; 60 if None.
         starts: From which a robot that knows nothing is found; 200 if None.
         workers: Processes at once.
         as_json: Whether JSON goes to standard output, instead of tables.
     """
     from interfaces.lab import Study
+    from interfaces.lab.control import study as views
     from interfaces.lab.goals import study as trips
     from interfaces.lab.localization import study as rooms
     from interfaces.lab.output import to_json
@@ -66,6 +68,9 @@ def study(
     if what == GOALS:
         asked = Study(seed, trips.GOALS if runs is None else runs)
         paper, write = trips.study_of(asked.runs), trips.write
+    elif what == CONTROL:
+        asked = Study(seed, views.RUNS if runs is None else runs)
+        paper, write = views.PAPER, views.write
     else:
         asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
         paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
@@ -83,9 +88,9 @@ def lab(
     what: Annotated[
         str,
         argument(
-            "localization|goals",
-            "How well the robot knows where it is, or whether it gets where it's told to go, instead of the"
-            " architectures.",
+            "localization|goals|control",
+            "How well the robot knows where it is, whether it gets where it's told to go, or what seeing the virtual"
+            " robot is worth, instead of the architectures.",
         ),
     ] = "",
     architecture: Annotated[
@@ -124,7 +129,7 @@ def lab(
         int | None,
         option(
             "K",
-            "Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals.",
+            "Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals; courses, 5, of control.",
             min=1,
             max=10_000,
         ),
@@ -150,12 +155,13 @@ def lab(
     from vrs.checks import one_of
 
     if what:
-        one_of("experiment", what, (LOCALIZATION, GOALS))
+        one_of("experiment", what, (LOCALIZATION, GOALS, CONTROL))
         others = {
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
             "--operator": operator, "--position": position, "--attribution": attribution, "--record": record,
         }  # fmt: skip
-        refuse(what, {**others, "--length": length, "--starts": starts} if what == GOALS else others)
+        driven = what == LOCALIZATION
+        refuse(what, others if driven else {**others, "--length": length, "--starts": starts})
         study(what, out, seed, runs, length, starts, workers, as_json=as_json)
         return
     refuse("the architectures", {"--starts": starts})

@@ -15,6 +15,7 @@ from interfaces.runtime.laboratory import Laboratory, VirtualPart, run_parts
 from interfaces.teleop import JointReference, OperatorSite, VirtualArm
 from robots import puma560
 from robots.onboard.playout import PlayState
+from robots.robot import ArmBody
 from vrs import Engine, Insertion, JointTarget, ManualClock, MotionCommand, SteerCommand, Stop
 from vrs.commands import Command
 from vrs.model import Array
@@ -139,16 +140,19 @@ class PortLog:
             self.outcomes.setdefault(message.number, message)
 
 
-def twins(way: Conditions, rng: np.random.Generator, robot: RobotMaker = adaptive) -> Laboratory:
+def twins(
+    way: Conditions, rng: np.random.Generator, robot: RobotMaker = adaptive, body: ArmBody | None = None
+) -> Laboratory:
     """Both sites of a robot at home, over a link that does the same each way.
 
     Args:
         way: What it does.
         rng: Source of everything random in it.
         robot: Makes the robot's site; ours adapts.
+        body: What follows; without one nothing is measured.
     """
     operator = OperatorSite(VirtualArm(MODEL, HOME, now=0.0))
-    return Laboratory(operator, robot(MODEL, HOME), LinkConditions.symmetric(way), rng)
+    return Laboratory(operator, robot(MODEL, HOME), LinkConditions.symmetric(way), rng, body=body)
 
 
 def limits_used(q: Array, step: float) -> float:

@@ -113,7 +113,11 @@ _ASIDE: Final = math.radians(50)
 
 
 class Operator(Protocol):
-    """Somebody who drives the virtual robot."""
+    """Somebody who drives the virtual robot.
+
+    One that has `sees_real` set is shown where the real robot was reported last, instead; one that comes to have
+    `finished` set drives no more.
+    """
 
     @property
     def start(self) -> Posture:

@@ -125,7 +125,9 @@ def _driven(
         now, send = k * CONTROL, k % every == 0
         virtual.ended = k >= driving
         if send and not virtual.ended:
-            wanted = driver.drive(now, site.posture, site.before)
+            wanted = driver.drive(now, _seen(driver, operator, site.posture), site.before)
+            if getattr(driver, "finished", False):
+                driving = k + every
             wanted = STAND if now >= case.length - STOPPING else wanted
             virtual.wish(wanted.v, wanted.w, issued_at=now, now=now)
         for orders in operator.advance(now=now):
@@ -184,6 +186,14 @@ def _driven(
         reported_bytes=reported_bytes,
         learned=tuple(learned),
     )
+
+
+def _seen(driver: Operator, site: OperatorSite[VirtualBase], virtual: Posture) -> Posture:
+    """Where an operator sees the robot that he looks at."""
+    if not getattr(driver, "sees_real", False):
+        return virtual
+    newest = site.report
+    return driver.start if newest is None or newest.report is None else Posture(*newest.report.posture)
 
 
 FOLDER: Final = "runs"
