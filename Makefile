@@ -43,9 +43,11 @@ bench: $(BENCH_STAMP)
 reproduce: $(STAMP)
 	.venv/bin/vrs lab localization --out out/reproduce/localization
 	.venv/bin/vrs lab goals --out out/reproduce/goals
+	.venv/bin/vrs lab control --out out/reproduce/control
 	.venv/bin/vrs reproduce all --body mujoco --runs 5 --out out/reproduce/mujoco
 	.venv/bin/vrs reproduce all --out out/reproduce --beyond out/reproduce/localization/summary.json \
-		--beyond out/reproduce/goals/summary.json --beyond benchmarks/results.json \
+		--beyond out/reproduce/goals/summary.json --beyond out/reproduce/control/summary.json \
+		--beyond benchmarks/results.json \
 		$(patsubst %,--beyond out/reproduce/mujoco/%.json,han2001 kim2002 tipsuwan)
 
 # The documentation as a site, in out/site; a warning is an error.

@@ -89,8 +89,8 @@ def lab(
         str,
         argument(
             "localization|goals|control",
-            "How well the robot knows where it is, whether it gets where it's told to go, or what seeing the virtual"
-            " robot is worth, instead of the architectures.",
+            "How well the robot knows where it is, whether it gets where it's told to go, or what it's worth to see"
+            " the virtual robot, instead of the architectures.",
         ),
     ] = "",
     architecture: Annotated[
@@ -129,7 +129,7 @@ def lab(
         int | None,
         option(
             "K",
-            "Seeds of each, 5 unless given; rooms, 30, of localization; goals, 100, of goals; courses, 5, of control.",
+            "Seeds of each, courses of control, 5 unless given; rooms of localization, 30; goals of goals, 100.",
             min=1,
             max=10_000,
         ),

@@ -85,7 +85,7 @@ def drive(view: str, profile: str, seed: int) -> Results:
     (x, y), (dx, dy) = line.points[0].tolist(), (line.points[1] - line.points[0]).tolist()
     who = follower(view, line, Wheels())
     driver = Driver(who, Posture(x, y, math.atan2(dy, dx)), sees_real=view != TWIN)
-    case = DriveCase("timeline", Transport.DATAGRAMS, _network(profile), USUAL_BASE, seed=seed, length=LONGEST)
+    case = DriveCase("timeline", Transport.DATAGRAMS, network(profile), USUAL_BASE, seed=seed, length=LONGEST)
     made = run(case, driver)
     return measured("base", line, made.t, made.real[:, :2], who)
 
@@ -98,7 +98,7 @@ def steer(view: str, profile: str, seed: int) -> Results:
 
 def _steered(view: str, profile: str, seed: int, body: ArmBody) -> Results:
     line = course("arm", _rng(seed, 6))
-    way = Conditions(delay=delay_profile(_network(profile)), service=Service.DATAGRAM)
+    way = Conditions(delay=delay_profile(network(profile)), service=Service.DATAGRAM)
     lab = twins(way, _rng(seed, 7), body=body)
     virtual, who = lab.operator.robot, follower(view, line, Tool())
 
@@ -120,7 +120,8 @@ def _steered(view: str, profile: str, seed: int, body: ArmBody) -> Results:
     return measured("arm", line, lab.t, tool(lab.reference.q), who)
 
 
-def _network(profile: str) -> str:
+def network(profile: str) -> str:
+    """A profile of delays, as the command line spells it."""
     return f"{profile}@{TAU}"
 
 
