@@ -8,8 +8,6 @@ from typing import Final
 from tests.contract.doors import DATA
 
 Line = tuple[str, ...]
-SLOW: Final = ("han2001", "kim2002", "tipsuwan")
-"""Papers that take most of a minute each: `make contract` measures them, `make test` doesn't."""
 
 
 SPEEDS: Final = {

@@ -84,7 +84,7 @@ def test_a_planted_fault_is_found(name: str, monkeypatch: pytest.MonkeyPatch) ->
     # The definitions are enough: no vector is at hand for a message that has just been added.
     for corpus in (vectors(encoding), drawn(encoding)):
         # Which of some 50,000 frames it needs hangs on the seed, and on each line that decoders have.
-        found = (Fuzzer(encoding, EVERYTHING, list(corpus), Random(seed)).run(50_000) for seed in (2, 3, 4, 5))
+        found = (Fuzzer(encoding, EVERYTHING, list(corpus), Random(seed)).run(50_000) for seed in (4, 2, 3, 5))
         finding = next(filter(None, found), None)
         assert finding is not None
         assert "ProtocolError" not in finding.error
