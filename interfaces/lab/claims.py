@@ -103,6 +103,11 @@ class Claim:
         return Verdict.NOT_SHOWN if self.counterfactual is None or self.counterfactual.met else Verdict.HOLDS
 
     @property
+    def speed_verdict(self) -> Verdict:
+        """The same of a bar of the machine's speed, which nothing has to stand beside."""
+        return Verdict.HOLDS if self.met else Verdict.FAILS
+
+    @property
     def holds(self) -> bool:
         """Whether the figures show it."""
         return self.verdict is Verdict.HOLDS
@@ -158,6 +163,20 @@ def above(claim: str, source: str, bar: float, measured: Measured, without: With
 def below_zero(claim: str, source: str, difference: Estimate, without: Without = None) -> Claim:
     """A claim that a difference, with all of its interval, lies below zero; see `at_most`."""
     return _bounded(claim, source, "< 0", difference, without, lambda end: end < 0)
+
+
+def beats(claim: str, source: str, saved: Estimate, rival: tuple[str, Estimate]) -> Claim:
+    """A claim that a figure is surely less than a rival's; in the rival's own place nothing would be saved.
+
+    Args:
+        claim: What is claimed, with the unit of what was measured.
+        source: Where.
+        saved: The rival's figure less ours, run by run: above zero with all of its interval.
+        rival: What it is, and its figure.
+    """
+    what, theirs = rival
+    itself = Counterfactual(what, theirs.value, met=False, interval=theirs.interval)
+    return Claim(claim, source, "over 0", saved.value, saved.low > 0, saved.interval, itself)
 
 
 def none_of(claim: str, source: str, count: int, without: tuple[str, int] | None = None, *, of: int = 1) -> Claim:

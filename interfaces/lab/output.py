@@ -116,7 +116,7 @@ def to_json(reproduction: Reproduction) -> str:
         "runs": study.runs,
         "length_s": study.length,
         **({"body": study.body} if study.body else {}),
-        "claims": [_claim(claim) for claim in found.claims],
+        "claims": [_claim(claim, claim.verdict, ours=claim.is_ours) for claim in found.claims],
         "tables": [
             {
                 "name": table.name,
@@ -127,13 +127,13 @@ def to_json(reproduction: Reproduction) -> str:
             for table in found.tables
         ],
         "figures": [{"file": f"{figure.name}.svg", "title": figure.title} for figure in found.figures],
-        "timings": [_claim(claim) for claim in found.timings],
+        "timings": [_claim(bar, bar.speed_verdict, ours=True) for bar in found.timings],
         "timings_note": "measured by the clock of the machine that ran this: never the same twice",
     }
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _claim(claim: Claim) -> dict[str, Any]:
+def _claim(claim: Claim, verdict: Verdict, *, ours: bool) -> dict[str, Any]:
     beside = claim.counterfactual
     return {
         "claim": claim.claim,
@@ -148,9 +148,9 @@ def _claim(claim: Claim) -> dict[str, Any]:
             "met": bool(beside.met),
         },
         "met": bool(claim.met),
-        "verdict": claim.verdict,
-        "holds": claim.holds,
-        "ours": claim.is_ours,
+        "verdict": verdict,
+        "holds": verdict is Verdict.HOLDS,
+        "ours": ours,
     }  # fmt: skip
 
 
@@ -222,18 +222,19 @@ def rich_tables(reproduction: Reproduction) -> list[RichTable]:
 
     found = reproduction.findings
     made = []
-    for title, claims in (("claims", found.claims), ("speed of this machine", found.timings)):
+    judged = (
+        ("claims", [(claim, claim.verdict) for claim in found.claims]),
+        ("speed of this machine", [(bar, bar.speed_verdict) for bar in found.timings]),
+    )
+    for title, claims in judged:
         if not claims:
             continue
-        is_speed = claims is found.timings
         table = RichTable(title=f"{reproduction.paper.name}: {title}", title_justify="left", show_lines=True)
         shares = {"claim": 4, "source": 2, "expected": 2, "measured": 3, "without it": 4, "verdict": 2}
         for name, share in shares.items():
             table.add_column(name, ratio=share, overflow="fold")
-        for claim in claims:
-            beside, verdict = claim.counterfactual, claim.verdict
-            if is_speed and claim.met:
-                verdict = Verdict.HOLDS
+        for claim, verdict in claims:
+            beside = claim.counterfactual
             without = "" if beside is None else f"{beside.what}: {measured_said(beside)}"
             words = claim.claim, claim.source, said(claim.expected), measured_said(claim), without
             table.add_row(*(word.replace("[", r"\[") for word in words), f"[{TONES[verdict]}]{verdict}[/]")

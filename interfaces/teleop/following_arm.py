@@ -250,12 +250,12 @@ class FollowingArm(RobotSite[Orders, Report]):
         self._log, self._messages = ReceivedLog(began), 0
         self._offset = AdaptiveOffset(self.config.offset)
         self._receipts.clear()
-        self._play = (
-            Playout(self.engine.timeline, self.engine.limits, now=now, p=began, config=self.config.playout)
-            if fixed is None
-            else EvenPlay(fixed)
-        )
+        self._play = self._playing(began, now) if fixed is None else EvenPlay(fixed)
         self._plays.append((now, self._play))
+
+    def _playing(self, p: float, now: float) -> Playout:
+        """Play of the engine's timeline from p on [s], by the law."""
+        return Playout(self.engine.timeline, self.engine.limits, now=now, p=p, config=self.config.playout)
 
     def _renew(self, now: float, **start: Any) -> None:
         """Begin with another engine, the hand as it has been told by now [s]."""

@@ -54,14 +54,15 @@ def completed(description: Description, tip: str = "") -> Description:
     """
     chosen = tip_of(description, tip)
     notes: list[str] = []
+    of_masses: list[str] = []
     on_chain = [joint for joint in description.chain(chosen) if joint.moves]
-    links = _with_inertia(description, [])
+    links = _with_inertia(description, of_masses)
     done = replace(description, joints=tuple(map(_assumed, description.joints)), links=links, tip=chosen)
     speed_time = _speed_time(done, [joint.name for joint in on_chain if not joint.qdd_max])
     if speed_time > SPEED_TIME:
         done = replace(done, joints=tuple(_assumed(joint, speed_time) for joint in description.joints))
     _say_joints(on_chain, notes, speed_time)
-    _with_inertia(description, notes)
+    notes += of_masses
     if not tip and not description.tip:
         leaves = [leaf for leaf in description.leaves() if leaf != chosen]
         others = f"; other ends are {', '.join(leaves)}" if leaves else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class BodyNavigator:
         body: MobileRobot,
         period: float,
         ways: type[RouteMap] = RouteMap,
-        navigator: type[Navigator] = Navigator,
+        navigator: Callable[..., Navigator] = Navigator,
     ) -> None:
         """Take a robot with a laser scanner and sonars.
 

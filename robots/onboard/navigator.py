@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.journey import Goal, Journey, JourneyState
+from robots.onboard.journey import Goal, Journey, JourneyConfig, JourneyState
 from robots.onboard.laser import LaserScan, OdometryTrack
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
@@ -51,6 +51,7 @@ class Navigator:
         avoidance: AvoidanceConfig,
         movers: MoversConfig,
         yielding: YieldingConfig,
+        journey: JourneyConfig | None = None,
     ) -> None:
         """Stand.
 
@@ -60,6 +61,7 @@ class Navigator:
             avoidance: Of what keeps it off what stands; its clearance is smaller than the margins of the routes.
             movers: Of what follows who walks.
             yielding: Of what goes out of their way.
+            journey: How it drives to a goal, and how long it tries.
         """
         self._mounts, self._half_cone, self._range_max = avoidance.mounts, avoidance.half_cone, avoidance.range_max
         tolerance = ObstacleMapConfig().tolerance
@@ -69,7 +71,7 @@ class Navigator:
         self.movers = MoverTracker(movers)
         """Who walks."""
         self.yielding = Yielding(yielding, self.avoidance)
-        self.journey = Journey(roads, self._standing, room=self._room)
+        self.journey = Journey(roads, self._standing, journey, room=self._room)
         """Its goal, its route, how far it is."""
         self._known = roads.outlines(_SPACING)
         self._odometry = OdometryTrack()

@@ -6,7 +6,6 @@ Everything but what is seen is the same: the real robot follows the operator's t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +14,6 @@ import numpy as np
 from interfaces.lab.claims import (
     OWN_BAR,
     Claim,
-    Counterfactual,
     Findings,
     Paper,
     PaperPart,
@@ -23,6 +21,7 @@ from interfaces.lab.claims import (
     Results,
     Study,
     Table,
+    beats,
 )
 from interfaces.lab.control.operators import Course, Driver, Follower, Hand, Stepper, Tool, Wheels
 from interfaces.lab.doulgeri.script import HOME, tool, twins
@@ -190,24 +189,17 @@ def conclude(study: Study, results: tuple[dict[str, tuple[Results, ...]], ...]) 
 
 def _gains(study: Study, case: str, runs: dict[str, tuple[Results, ...]]) -> list[Claim]:
     """How much quicker than who moves and waits, and how much nearer to the course than the tracker."""
-    said, twin = case.replace(":", " under "), runs[TWIN]
+    said = case.replace(":", " under ")
 
-    def beats(text: str, view: str, values: Sequence[float], theirs: Sequence[float]) -> Claim:
-        saved = bootstrap(np.subtract(theirs, values), study.seed)
-        rival = bootstrap(theirs, study.seed)
-        itself = Counterfactual(view, rival.value, met=False, interval=rival.interval)
-        return Claim(f"{said}: {text}", OWN_BAR, "over 0", saved.value, saved.low > 0, saved.interval, itself)
-
-    def of(view: str, name: str, scale: float = 1.0) -> list[float]:
-        return [scale * getattr(one, name) for one in runs[view]]
+    def saved(text: str, view: str, name: str, scale: float = 1.0) -> Claim:
+        ours, theirs = (np.array([scale * getattr(one, name) for one in runs[who]]) for who in (TWIN, view))
+        text = f"{said}: {text}"
+        return beats(text, OWN_BAR, bootstrap(theirs - ours, study.seed), (view, bootstrap(theirs, study.seed)))
 
     return [
-        beats("time saved by seeing the virtual robot [s]", WAITS, [one.time for one in twin], of(WAITS, "time")),
-        beats(
-            "path error saved by seeing the virtual robot, mean [mm]", TRACKER, of(TWIN, "error", 1e3),
-            of(TRACKER, "error", 1e3),
-        ),
-    ]  # fmt: skip
+        saved("time saved by seeing the virtual robot [s]", WAITS, "time"),
+        saved("path error saved by seeing the virtual robot, mean [mm]", TRACKER, "error", 1e3),
+    ]
 
 
 def _paint(canvas: Canvas, robot: str, views: dict[str, tuple[Results, ...]]) -> None:

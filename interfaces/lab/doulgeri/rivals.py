@@ -8,7 +8,6 @@ from typing import TypeAlias
 import numpy as np
 from typing_extensions import override
 
-from interfaces.messages.sites import Orders
 from interfaces.teleop import FollowingArm, RobotSiteConfig
 from robots.onboard.playout import Playout, PlayState
 from robots.onboard.watchdog import WatchdogConfig
@@ -41,6 +40,11 @@ def halting(model: RobotModel, q: Array) -> FollowingArm:
 class _WaitingPlay(Playout):
     """Play by the law of ours, at an offset that's fixed; as long as that isn't over, the arm doesn't begin."""
 
+    def __init__(self, timeline: Timeline, limits: Limits, *, now: float, p: float, offset: float) -> None:
+        """Wait at p, for an offset [s]; see `Playout`."""
+        super().__init__(timeline, limits, now=now, p=p)
+        self._offset = offset
+
     @override
     def aim(self, offset: float, *, now: float) -> None:
         """Learn nothing."""
@@ -72,12 +76,8 @@ class _WaitingArm(FollowingArm):
     """The offset [s]."""
 
     @override
-    def _start(self, orders: Orders, now: float) -> None:
-        super()._start(orders, now)
-        p = self._play_at(now)
-        self._play = _WaitingPlay(self.engine.timeline, self.engine.limits, now=now, p=p)
-        self._play._offset = self.held
-        self._plays[-1] = now, self._play
+    def _playing(self, p: float, now: float) -> Playout:
+        return _WaitingPlay(self.engine.timeline, self.engine.limits, now=now, p=p, offset=self.held)
 
 
 def waiting(D: float) -> RobotMaker:
@@ -131,11 +131,8 @@ class _JumpingArm(FollowingArm):
     """A robot that plays so."""
 
     @override
-    def _start(self, orders: Orders, now: float) -> None:
-        super()._start(orders, now)
-        p = self._play_at(now)
-        self._play = _JumpingPlay(self.engine.timeline, self.engine.limits, now=now, p=p)
-        self._plays[-1] = now, self._play
+    def _playing(self, p: float, now: float) -> Playout:
+        return _JumpingPlay(self.engine.timeline, self.engine.limits, now=now, p=p)
 
 
 def jumping(model: RobotModel, q: Array) -> FollowingArm:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 from numpy.typing import ArrayLike
@@ -9,14 +10,11 @@ from typing_extensions import override
 
 from interfaces.lab.goals.trial import Aboard
 from robots.mobile.position import OdometryPosition
-from robots.onboard.avoidance import AvoidanceConfig
 from robots.onboard.driving import Drive, Posture
-from robots.onboard.journey import Journey, JourneyConfig
+from robots.onboard.journey import JourneyConfig
 from robots.onboard.laser import LaserScan
-from robots.onboard.movers import MoversConfig, YieldingConfig
 from robots.onboard.navigator import Navigator
 from robots.onboard.routes import Bools, NoRoute, Point, Route, RouteMap
-from vrs.mobile.environment import Grid
 from vrs.model import Array
 
 
@@ -34,22 +32,6 @@ class HeedlessNavigator(Navigator):
     @override
     def drive(self, posture: Posture, *, now: float, v_before: float) -> Drive:
         return self.journey.control(posture, now=now, v_before=v_before)
-
-
-class ImpatientNavigator(Navigator):
-    """Gives up where every way is blocked, without waiting."""
-
-    def __init__(
-        self,
-        roads: RouteMap,
-        grid: Grid,
-        avoidance: AvoidanceConfig,
-        movers: MoversConfig,
-        yielding: YieldingConfig,
-    ) -> None:
-        """Stand."""
-        super().__init__(roads, grid, avoidance, movers, yielding)
-        self.journey = Journey(roads, self._standing, JourneyConfig(patience=0.0), room=self._room)
 
 
 class StraightWays(RouteMap):
@@ -74,7 +56,7 @@ class MappedWays(RouteMap):
 
 HEEDLESS: Final = Aboard(navigator=HeedlessNavigator)
 """Without avoidance."""
-IMPATIENT: Final = Aboard(navigator=ImpatientNavigator)
+IMPATIENT: Final = Aboard(navigator=partial(Navigator, journey=JourneyConfig(patience=0.0)))
 """Without waiting."""
 STRAIGHT: Final = Aboard(ways=StraightWays)
 """Without ways round what the map has."""

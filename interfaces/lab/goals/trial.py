@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,7 +105,7 @@ class Aboard:
     """Says where it is."""
     ways: type[RouteMap] = RouteMap
     """Finds its ways."""
-    navigator: type[Navigator] = Navigator
+    navigator: Callable[..., Navigator] = Navigator
     """Decides."""
 
 

@@ -18,13 +18,13 @@ import numpy as np
 from interfaces.lab.claims import (
     OWN_BAR,
     Claim,
-    Counterfactual,
     Findings,
     Results,
     Study,
     Table,
     above,
     at_most,
+    beats,
     none_of,
 )
 from interfaces.lab.driving.output import of_drives
@@ -203,11 +203,9 @@ def _pooled(
 
 
 def _beats(text: str, source: str, rival: tuple[str, Array], ours: Array, seed: int) -> Claim:
-    """A claim that a figure, (seeds, cases), is surely less than a rival's, seed by seed; the rival's own isn't."""
+    """A claim that a figure, (seeds, cases), is surely less than a rival's, seed by seed."""
     what, theirs = rival
-    saved, without = clustered(theirs - ours, seed), clustered(theirs, seed)
-    itself = Counterfactual(f"{what} itself", without.value, met=False, interval=without.interval)
-    return Claim(text, source, "over 0", saved.value, saved.low > 0, saved.interval, itself)
+    return beats(text, source, clustered(theirs - ours, seed), (f"{what} itself", clustered(theirs, seed)))
 
 
 def _papers(study: Study, found: dict[str, Results]) -> tuple[Claim, ...]:
@@ -316,68 +314,39 @@ def _of_network(study: Study, profile: str, runs: Runs) -> Iterator[Claim]:
         text = f"{profile}: {text}: {rival} − {who}"
         return _beats(text, OWN_BAR, (rival, values(rival, value)), values(who, value), study.seed)
 
+    def kept(who: str, text: str, bar: float, figure: Callable[[str], float], rival: str = UNTRACKED) -> Claim:
+        """A figure must keep a bar that a rival's doesn't."""
+        return at_most(f"{profile}: {who}: {text}", OWN_BAR, bar, figure(who), (rival, figure(rival)))
+
+    over, largest, late = middle("III-capped").value, mean("III", _largest), mean("III", _late)
     yield less("largest path error [cm]", "III", "I", _largest)
     for other in ("I", "II") if slow else ():
         yield less("mean time difference [s]", "III", other, _late)
     for who in (STREAMED, REPEATED):
         # The path, the progress, the speeds and the limits that `timeline` keeps on a transport.
-        said = f"{profile}: {who}"
-        over = middle("III-capped").value
         yield at_most(
-            f"{said}: largest path error, median [cm]",
-            OWN_BAR,
-            2.0,
-            middle(who).value,
+            f"{profile}: {who}: largest path error, median [cm]", OWN_BAR, 2.0, middle(who).value,
             (UNTRACKED, middle(UNTRACKED)),
-        )
-        yield at_most(
-            f"{said}: largest path error, worst seed [cm]",
-            OWN_BAR,
-            5.0,
-            values(who, _largest).max(),
-            (UNTRACKED, values(UNTRACKED, _largest).max()),
-        )
-        yield at_most(
-            f"{said}: its median less III-capped's [cm]",
-            OWN_BAR,
-            0.2,
-            middle(who).value - over,
-            (UNTRACKED, middle(UNTRACKED).value - over),
-        )
-        yield at_most(
-            f"{said}: largest share of the path not reached",
-            OWN_BAR,
-            round(1.0 - LEAST_PROGRESS, 4),
-            values(who, _missed).max(),
-            ("I", values("I", _missed).max()),
+        )  # fmt: skip
+        yield kept(who, "largest path error, worst seed [cm]", 5.0, lambda one: values(one, _largest).max())
+        yield kept(who, "its median less III-capped's [cm]", 0.2, lambda one: middle(one).value - over)
+        missed = round(1.0 - LEAST_PROGRESS, 4)
+        yield kept(
+            who, "largest share of the path not reached", missed, lambda one: values(one, _missed).max(), "I"
         )
         if profile in ("wed", "thu"):
-            third = mean("III", _largest)
-            yield at_most(
-                f"{said}: largest path error, mean, as a share of III's",
-                OWN_BAR,
-                0.2,
-                mean(who, _largest) / third,
-                (UNTRACKED, mean(UNTRACKED, _largest) / third),
-            )
+            text = "largest path error, mean, as a share of III's"
+            yield kept(who, text, 0.2, lambda one: mean(one, _largest) / largest)
         if slow:
             yield less("speed-profile error [cm/s]", who, "III", _speed)
         yield none_of(
-            f"{said}: collisions and limits passed",
-            OWN_BAR,
-            sum(map(_broken, runs[who])),
+            f"{profile}: {who}: collisions and limits passed", OWN_BAR, sum(map(_broken, runs[who])),
             (UNTRACKED, sum(map(_broken, runs[UNTRACKED]))),
-        )
+        )  # fmt: skip
     if slow:
         # A stream makes everybody wait alike: that it's no worse is all that's claimed there.
-        third = mean("III", _late)
-        yield at_most(
-            f"{profile}: {STREAMED}: mean time difference as a share of III's",
-            OWN_BAR,
-            1.1,
-            mean(STREAMED, _late) / third,
-            ("II", mean("II", _late) / third),
-        )
+        text = "mean time difference as a share of III's"
+        yield kept(STREAMED, text, 1.1, lambda one: mean(one, _late) / late, "II")
         yield less("mean time difference [s]", THIRD_REPEATED, "III", _late)
     else:
         yield less("mean time difference [s]", STREAMED, "III", _late)
