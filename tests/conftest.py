@@ -3,6 +3,8 @@
 `VRS_WITHOUT=pybullet,pybullet_data` or `VRS_WITHOUT=mujoco` hides those modules from tests and from the processes
 that they start. A test that fails because of one of them is skipped, and says which; everything else runs with what
 is there.
+
+A test against the clock that fails while the machine stood still is tried once more, and counted as tried again.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from _pytest.runner import runtestprotocol
+
+from tests.stood_still import LONG, StallWatch
 
 WITHOUT = Path(__file__).parent / "without"
 HIDDEN = frozenset(os.environ.get("VRS_WITHOUT", "").split(",")) - {""}
@@ -24,11 +29,15 @@ if HIDDEN and str(WITHOUT) not in os.environ.get("PYTHONPATH", "").split(os.path
     runpy.run_path(str(WITHOUT / "sitecustomize.py"))
 
 BROWSER = re.compile(r"\b(browser|new_page)\b")
+LIVE = re.compile(rf"{BROWSER.pattern}|\b(monotonic|perf_counter|sleep|Popen|child)\b")
+"""What a test uses that waits for the clock."""
+AGAIN = "tried again"
+STALLS = pytest.StashKey[StallWatch]()
 
 
 @cache
-def _has_browser(file: str) -> bool:
-    return bool(BROWSER.search(Path(file).read_text(encoding="utf-8")))
+def _matches(pattern: re.Pattern[str], file: str) -> bool:
+    return bool(pattern.search(Path(file).read_text(encoding="utf-8")))
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -43,9 +52,40 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.split("::", 1)[0]
-            return "browser" if _has_browser(str(config.rootpath / file)) else file
+            return "browser" if _matches(BROWSER, str(config.rootpath / file)) else file
 
     return ByFile(config, log)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Run a test against the clock; once more, with new fixtures, if it fails while the machine stands still."""
+    if not _matches(LIVE, str(item.path)):
+        return None
+    if STALLS not in item.config.stash:
+        item.config.stash[STALLS] = StallWatch()
+    stalls = item.config.stash[STALLS]
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    stalls.reset()
+    reports = runtestprotocol(item, log=False, nextitem=nextitem)
+    if any(report.failed for report in reports) and stalls.longest > LONG:
+        for report in reports:
+            if report.failed:
+                report.outcome = AGAIN
+                report.sections.append(("machine", f"stood still for {stalls.longest:.3f} s"))
+                item.ihook.pytest_runtest_logreport(report=report)
+        item.session._setupstate.teardown_exact(None)
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
+    """Count a first try apart: it's neither passed nor failed."""
+    return (AGAIN, "A", "TRIED AGAIN") if report.outcome == AGAIN else None
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
