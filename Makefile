@@ -6,13 +6,17 @@ DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test without contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test slow without contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
 
 test: $(DEV_STAMP) lint types
 	$(PY) -m pytest -n 3 --durations=5
+
+# What `make test` leaves out, so that it takes a quarter of an hour.
+slow: $(DEV_STAMP)
+	$(PY) -m pytest -n 3 --durations=5 -m slow
 
 # The same as if PyBullet, and as if MuJoCo, weren't installed.
 without: $(DEV_STAMP)
@@ -21,7 +25,7 @@ without: $(DEV_STAMP)
 
 # What must not change, through doors alone: commands, sockets, files, public packages; the slow papers, too.
 contract: $(DEV_STAMP)
-	VRS_CONTRACT_SLOW=1 $(PY) -m pytest -n 2 --no-loadscope-reorder --durations=5 tests/contract
+	$(PY) -m pytest -n 2 --no-loadscope-reorder --durations=5 -m "" tests/contract
 
 # What is derived from the definitions of messages: the script that checks them in pages, the documents' tables.
 generate: $(STAMP)

@@ -16,6 +16,7 @@ from collections.abc import Generator, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -42,7 +43,8 @@ def _matches(pattern: re.Pattern[str], file: str) -> bool:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """One process has all files with a browser: two browsers that draw by software would take both cores.
+    """Two processes have all files with a browser, which wait most of the time; three that draw would be in each
+    other's way.
 
     The other files go whole to whoever is free, so that what a file shares is made once. (xdist's own groups don't
     work with this pytest.)
@@ -52,7 +54,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.split("::", 1)[0]
-            return "browser" if _matches(BROWSER, str(config.rootpath / file)) else file
+            return f"browser {crc32(file.encode()) % 2}" if _matches(BROWSER, str(config.rootpath / file)) else file
 
     return ByFile(config, log)
 

@@ -25,9 +25,10 @@ LONG: Final = (
 ELSEWHERE: Final = {
     "make demo": "the gate, .ci/run",
     "make test": "the gate, .ci/run",
+    "make slow": "the gate, .ci/run",
     "make reproduce": "by hand, about an hour; tests/interfaces/test_reproduce.py has every part in small",
     "make bench": "by hand; benchmarks/RESULTS.md is what it wrote",
-    "make contract": "by hand; make test has it but for the papers that take longest",
+    "make contract": "by hand; make test and make slow have it",
     "python -m tests.contract.golden": "by hand, where results are to change",
     "make soak": "by hand; tests/vrs/test_soak.py has it in small",
     "make docs": "by hand, and tests/test_docs.py checks links and anchors",

@@ -146,7 +146,7 @@ def seen(tree: Path, fault: Fault, workers: int) -> str | None:
 def _first_failure(tree: Path, tests: list[str], workers: int, without: list[str]) -> str | None:
     """Return what fails first, or how the run ended otherwise; None where all pass."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-n", str(workers), *tests]
-    command += [f"--deselect={test}" for test in without]
+    command += ["-m", "", *(f"--deselect={test}" for test in without)]
     environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(

@@ -72,6 +72,7 @@ def follows(client: Client) -> None:
     client.until(lambda m: m["type"] in {"state", "postures"} and m.get("connected", True) and not m.get("halted"))
 
 
+@pytest.mark.slow
 def test_two_terminals_work_by_default_over_a_slow_link():
     with sites((), ("--delay", "tue")) as (robot, client):
         assert robot.wait(lambda facts: facts["operator"])["link_loss"] == "hold"

@@ -27,6 +27,8 @@ from vrs.notes import NoteCode
 MODEL = puma560.model()
 LIMITS = MODEL.limits
 SHARDS, EDITS, SESSION = 50, 2000, 40
+QUICK = 15
+"""Of them, how many `make test` runs."""
 
 
 @dataclass
@@ -180,7 +182,9 @@ def check_session(engine: Engine, worst: Extremes) -> None:
             worst.see(name, np.abs(values(a[:-1], ends, order) - values(a[1:], 0 * ends, order)).max())
 
 
-@pytest.mark.parametrize("shard", range(SHARDS))
+@pytest.mark.parametrize(
+    "shard", [*range(QUICK), *(pytest.param(shard, marks=pytest.mark.slow) for shard in range(QUICK, SHARDS))]
+)
 def test_laws_hold_on_random_edits(shard: int) -> None:
     rng = np.random.default_rng([560, shard])
     worst = Extremes()

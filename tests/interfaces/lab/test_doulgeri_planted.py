@@ -305,6 +305,7 @@ def test_every_part_is_planted_in() -> None:
     assert set(PLANTED) == set(PARTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", PLANTED)
 def test_what_is_switched_off_turns_its_claims(title: str, monkeypatch: pytest.MonkeyPatch) -> None:
     part, (switches, cases) = PARTS[title], PLANTED[title]

@@ -161,6 +161,7 @@ def test_claims_on_closed_doors_and_on_physics_fail_where_a_trip_did() -> None:
     assert holds(conclude_physics, found(PHYSICS, touched=(Collision(1.0, "chair"),))) == [True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_maps")
 def test_without_what_they_say_claims_on_goals_hold_no_more() -> None:
     # A robot that waits takes long: the last one is made up.

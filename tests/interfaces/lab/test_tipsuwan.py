@@ -279,6 +279,7 @@ def test_the_arcs_of_a_curve_lie_along_it():
     assert math.dist(path.end[:2], (end.x, end.y)) < 0.02
 
 
+@pytest.mark.slow
 def test_the_gains_claims_hold(monkeypatch):
     monkeypatch.setattr(gain, "EXAMPLES", 5000)
     monkeypatch.setattr(gain, "GUARDED", 20_000)

@@ -174,6 +174,7 @@ def test_a_joints_bar_is_drawn_and_moves_when_it_is_let_go(page: Page) -> None:
     page.rest()
 
 
+@pytest.mark.slow
 def test_poses_are_saved_for_all_gone_to_and_deleted(browser: Any, server: Child, page: Page) -> None:
     q = bent(page)
     page.wait("station.jog.q !== null")

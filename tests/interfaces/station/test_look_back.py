@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from interfaces.recording.recording import open_recording
 from tests.interfaces.live_rig import child
@@ -43,6 +44,7 @@ def replayed(page: Page) -> Any:
     return shown
 
 
+@pytest.mark.slow
 def test_what_is_driven_is_looked_back_at_while_it_is_recorded(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
     recorded = ("--record", str(path), "--recordings", str(tmp_path), "--jobs", str(tmp_path / "jobs.json"))

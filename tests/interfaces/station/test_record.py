@@ -126,6 +126,7 @@ def recorded(page: Page, served: Served) -> tuple[Path, Path]:
     return served.directory / "first.mcap", served.directory / "second one.mcap"
 
 
+@pytest.mark.slow
 def test_a_recording_begun_late_holds_all_that_compare_needs(recorded: tuple[Path, Path], capsys: Any) -> None:
     for path, commands in zip(recorded, (1, 2), strict=True):
         with open_recording(path) as recording:

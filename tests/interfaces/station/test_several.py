@@ -60,6 +60,7 @@ def leased(robot: Connection) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_a_page_of_each_robot_shows_both_and_moves_its_own(browser: Any, server: Child) -> None:
     url = station(server)
     with paged(browser, url) as arm, paged(browser, url) as base:

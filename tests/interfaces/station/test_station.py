@@ -233,6 +233,7 @@ def plan(page: Page, pose: str, seconds: float) -> str:
     return next(name for name in scheduled(page) if name not in known)
 
 
+@pytest.mark.slow
 def test_a_scheduled_move_is_drawn_along_and_runs_then(page: Page) -> None:
     page.take_control().rest()
     page.page.fill("#speed", "30")

@@ -169,6 +169,7 @@ def test_what_the_hand_is_told_stands_on_everybodys_strip(browser: Any, server: 
     page.page.click("#give")
 
 
+@pytest.mark.slow
 def test_a_plan_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     page.take_control().rest()
     says(page, "#save", "nothing is planned")

@@ -127,6 +127,7 @@ def stands_at(page: Page, place: tuple[float, float, float]) -> bool:
     return math.dist((x, y), place[:2]) < 0.05 and abs(math.remainder(theta - place[2], math.tau)) < math.radians(2)
 
 
+@pytest.mark.slow
 def test_the_papers_scenario_is_listed_tried_and_done(page: Page, kept: Path) -> None:
     page.page.click("#theme")
     page.page.click("#tab-jobs")

@@ -128,6 +128,7 @@ def test_lines_are_edited_completed_and_recalled(browser: Any, server: Child) ->
         assert "*Too many" not in page.get(TEXT)
 
 
+@pytest.mark.slow
 def test_who_only_watches_and_who_has_no_control(browser: Any, tokens: tuple[Path, dict[Role, str]]) -> None:
     path, known = tokens
     with child(*SERVE, "--token-file", str(path), "--port", "0") as server:

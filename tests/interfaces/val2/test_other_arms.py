@@ -209,6 +209,7 @@ def console(url: str, text: str, *arguments: str) -> subprocess.CompletedProcess
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_at_a_served_arm_and_at_a_console_elsewhere() -> None:
     with server() as (url, port, token):
         with terminal(port, token) as say:
