@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from robots import load
-from robots.bullet.rooms import read_room
 from robots.mobile.camera import PanTilt, Sight
 from robots.robot import HeadCamera
+from robots.rooms import read_room
 
 room = read_room("""room 1
 name A hall

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveBody, LiveRobot
-    from robots.bullet.rooms import Room
+    from robots.rooms import Room
 
 
 def thin_client(

@@ -64,9 +64,9 @@ if TYPE_CHECKING:
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
     from interfaces.stream.join import JoinPages
-    from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
+    from robots.rooms import Room
     from vrs.clock import Clock
 
 

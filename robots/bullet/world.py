@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import override
 
-from robots.bullet.rooms import Block, Room, Standing, moves, pose_at, solid
 from robots.robot import Closing
+from robots.rooms import Block, Room, Standing, moves, pose_at, solid
 from robots.solids import LinkShape
 from robots.vehicle import FLOOR_FRICTION, THING_FRICTION
 from vrs.errors import InvalidValueError, VrsError

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.bullet.rooms import Room
 from robots.cubo import parameters as p
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.mobile.position import FusedPosition, TruePosition
+from robots.rooms import Room
 from robots.simulated import WORLDS
 from vrs.checks import finite
 from vrs.errors import InvalidValueError

@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from robots.base import PERIOD
-from robots.bullet.rooms import Room
 from robots.bullet.world import LostError, WorldClosedError
 from robots.chain import Inertia, together
 from robots.mobile.chassis import Chassis, MobileReality, Senses
 from robots.mobile.robot import BareBody, MobileRobot
 from robots.robot import BARE
+from robots.rooms import Room
 from robots.simulated import WORLDS
 from robots.vehicle import Cargo, RigidVehicle, Vehicle, VehiclePart, Wheel
 from vrs.errors import InvalidValueError

@@ -17,10 +17,10 @@ import numpy as np
 from msgspec import Meta
 
 from robots.base import upright
-from robots.bullet.rooms import EMPTY, Room, is_wall
 from robots.bullet.world import Picture, Studio
 from robots.mobile.shapes import GROUND, box, door_shape, person_shape, room_shapes
 from robots.robot import HeadCamera
+from robots.rooms import EMPTY, Room, is_wall
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError

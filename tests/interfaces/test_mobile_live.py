@@ -40,10 +40,10 @@ from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.following_base import DrivenConfig
 from interfaces.teleop.virtual_base import VirtualBase
 from robots import load
-from robots.bullet.rooms import EMPTY
 from robots.mobile.robot import place
 from robots.onboard.journey import Goal, JourneyState
 from robots.robot import IDEAL
+from robots.rooms import EMPTY
 from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside

@@ -29,12 +29,12 @@ from interfaces.lab.goals.study import (
     write,
 )
 from interfaces.lab.goals.trial import Trip, TripSetting
-from robots.bullet.rooms import Block, Room
 from robots.ipr.parameters import IPR
 from robots.mobile.navigation import route_map
 from robots.mobile.robot import Collision
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.routes import Route, RouteProblem
+from robots.rooms import Block, Room
 from vrs.errors import InvalidValueError
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from robots.base import upright
-from robots.bullet.rooms import EMPTY, read_room
 from robots.bullet.world import SKY, Picture
 from robots.mobile.camera import Lens, Look, Sight, lens_pose
 from robots.robot import HeadCamera, load
+from robots.rooms import EMPTY, read_room
 
 CAMERA = load("ipr").device(HeadCamera)
 assert CAMERA is not None
