@@ -152,6 +152,7 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
     assert part.limits == model.limits
 
 
+@pytest.mark.needs("pybullet")
 @pytest.mark.parametrize("chassis", [IPR, MICRO])
 def test_pybullet_has_what_it_was_given(chassis: Chassis) -> None:
     # It drops inertias silently when a call names damping, too.
