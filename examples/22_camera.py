@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from robots import load
-from robots.bullet.rooms import read_room
 from robots.mobile.camera import PanTilt, Sight
 from robots.robot import HeadCamera
+from robots.rooms import read_room
 
 room = read_room("""room 1
 name A hall
@@ -37,7 +37,6 @@ for k in range(60):
     errors.append(math.degrees(abs(wanted - axes.look(t).pan)))
     if k % 15 == 14:
         pictures.append(sight.draw(room.start, axes.look(t), t))
-sight.close()
 
 Image.fromarray(np.hstack(pictures)).save(Path("pictures.png"))
 print(f"the camera began {max(errors):.0f} deg away, and was {np.median(errors):.1f} deg behind on the way")

@@ -12,7 +12,7 @@ from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from robots import load
-from robots.bullet.things import Scene, read_scene
+from robots.things import Scene, read_scene
 
 HERE = Path(__file__).resolve().parent / "val2"
 OUT = Path("out") / "grasp.mcap"

@@ -346,6 +346,11 @@ class Robot:
         """Name of the body that it has unless another is asked for."""
         return next(iter(self.bodies), IDEAL)
 
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of all its bodies, the usual one first; drivers aside."""
+        return tuple(dict.fromkeys((*self.bodies, *(() if self.is_base else (IDEAL,)))))
+
     def has_body(self, name: str) -> bool:
         """Whether it has a body of a name: see `body_name`."""
         return name in self.bodies or (not self.is_base and (name in {IDEAL, EXACT} or is_driver(name)))
@@ -363,8 +368,7 @@ class Robot:
         asked = IDEAL if name == EXACT else name or self.usual_body
         if is_driver(asked) and not self.is_base:
             return asked
-        ideal = () if self.is_base else (IDEAL,)
-        return one_of(f"body of {self.name}", asked, dict.fromkeys((*self.bodies, *ideal)))
+        return one_of(f"body of {self.name}", asked, self.body_names)
 
     def with_body(self, name: str) -> Self:
         """The same robot, of which another body is the usual one; see `body_name`.

@@ -137,8 +137,20 @@ class Makers(NamedTuple):
 
 WORLDS: Final = {"bullet": Makers(BulletChain, BulletVehicle), "mujoco": Makers(MujocoChain, MujocoVehicle)}
 """Worlds of physics by the names of bodies; the usual one first, PyBullet where it's installed."""
-if find_spec("pybullet") is None:
+_NEEDED: Final = {"bullet": "pybullet", "mujoco": "mujoco"}
+"""Packages that worlds need."""
+
+
+def missing_for(body: str) -> str:
+    """Return the package that a body needs and that isn't installed; empty where it can be made here."""
+    needed = _NEEDED.get(body, "")
+    return needed if needed and find_spec(needed) is None else ""
+
+
+if missing_for("bullet"):
     WORLDS["bullet"] = WORLDS.pop("bullet")
+USUAL_WORLD: Final = next(iter(WORLDS))
+"""The world of a body unless another is asked for."""
 _BOUNDS: Final = (1e3, 1e3, 1e5)
 _CREEP: Final = 0.01
 """Joint speed below which the Coulomb compensation fades out [rad/s], [m/s]."""
@@ -153,7 +165,7 @@ class SimulatedArm(Closing):
         q: ArrayLike,
         *,
         inertia: Sequence[float],
-        world: str = "bullet",
+        world: str = USUAL_WORLD,
         reality: Reality | None = None,
         payload: Payload | None = None,
         gains: ServoGains | None = None,

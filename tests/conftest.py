@@ -1,8 +1,10 @@
 """How tests are shared out to processes, and what runs where a world of physics isn't installed.
 
 `VRS_WITHOUT=pybullet,pybullet_data` or `VRS_WITHOUT=mujoco` hides those modules from tests and from the processes
-that they start. A test that fails because of one of them is skipped, and says which; everything else runs with what
-is there.
+that they start; where one isn't installed the same holds. What needs one says so, and is skipped: a test by the
+mark `needs("pybullet")`, by a parameter that is the name of a world (`"bullet"`, `"mujoco"`, or a `partial` with
+`world="bullet"`), or by importing the module itself. Everything else runs with what is there: if the product can't
+do without, that's a failure. So is a mark on a test that passes without.
 
 A test against the clock that fails while the machine stood still is tried once more, and counted as tried again.
 """
@@ -12,8 +14,10 @@ from __future__ import annotations
 import os
 import re
 import runpy
-from collections.abc import Generator, Iterator
-from functools import cache
+import traceback
+from collections.abc import Generator
+from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -29,6 +33,12 @@ if HIDDEN and str(WITHOUT) not in os.environ.get("PYTHONPATH", "").split(os.path
     os.environ["PYTHONPATH"] = os.pathsep.join([str(WITHOUT), *filter(None, [os.environ.get("PYTHONPATH")])])
     runpy.run_path(str(WITHOUT / "sitecustomize.py"))
 
+HOME = Path(__file__).parents[1]
+WORLDS = {"bullet": "pybullet", "mujoco": "mujoco"}
+"""Modules of the worlds of physics, by the names of bodies."""
+ABSENT = HIDDEN | {name for name in ("pybullet", "pybullet_data", "mujoco") if find_spec(name) is None}
+"""Modules that aren't there, hidden ones among them."""
+PRODUCT = ("vrs", "robots", "interfaces")
 BROWSER = re.compile(r"\b(browser|new_page)\b")
 LIVE = re.compile(rf"{BROWSER.pattern}|\b(monotonic|perf_counter|sleep|Popen|child)\b")
 """What a test uses that waits for the clock."""
@@ -90,34 +100,60 @@ def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] 
     return (AGAIN, "A", "TRIED AGAIN") if report.outcome == AGAIN else None
 
 
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """An error, and those that it was raised from or amid."""
+def asked(value: object) -> str:
+    """Return the module that a parameter asks for; empty for none."""
+    if isinstance(value, partial):
+        value = value.keywords.get("world")
+    return WORLDS.get(value, "") if isinstance(value, str) else ""
+
+
+def _lacks(item: pytest.Item) -> tuple[set[str], set[str]]:
+    """Modules that aren't there and that a test asks for: by marks, and by parameters."""
+    marked = {name for mark in item.iter_markers("needs") for name in mark.args}
+    parameters = getattr(item, "callspec", None)
+    values = () if parameters is None else parameters.params.values()
+    return marked & ABSENT, {asked(value) for value in values} & ABSENT
+
+
+def _imported(error: BaseException | None) -> str:
+    """The module that isn't there and that a test imports itself; empty if the product did, or nobody."""
     while error is not None:
-        yield error
+        if isinstance(error, ModuleNotFoundError) and error.name in ABSENT:
+            frames = [Path(frame.filename) for frame in traceback.extract_tb(error.__traceback__)]
+            inside = [any(path.is_relative_to(HOME / package) for package in PRODUCT) for path in frames]
+            return "" if any(inside) else error.name
         error = error.__cause__ or error.__context__
+    return ""
 
 
-def _skipped(report: Any, call: Any) -> None:
-    """Let a failure for want of a hidden module count as skipped."""
-    if HIDDEN and report.outcome == "failed" and call.excinfo is not None:
-        for error in _chain(call.excinfo.value):
-            if isinstance(error, ModuleNotFoundError) and error.name in HIDDEN:
-                report.outcome = "skipped"
-                report.longrepr = (report.nodeid.split("::", 1)[0], 0, f"Skipped: needs {error.name}")
-                return
+def _skip(report: Any, needs: str) -> None:
+    report.outcome = "skipped"
+    report.longrepr = (report.nodeid.split("::", 1)[0], 0, f"Skipped: needs {needs}")
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, Any]:
-    """Skip files that need a hidden module."""
+    """Skip files that import a hidden module."""
     report = yield
-    _skipped(report, report.call)
+    if ABSENT and report.outcome == "failed" and report.call.excinfo is not None:
+        needs = _imported(report.call.excinfo.value)
+        if needs:
+            _skip(report, needs)
     return report
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
-    """Skip tests that need a hidden module."""
+    """Skip tests that fail and need a hidden module; let those fail that say that they need one, and don't."""
     report = yield
-    _skipped(report, call)
+    if ABSENT:
+        marked, others = _lacks(item)
+        if report.outcome == "failed":
+            error = None if call.excinfo is None else call.excinfo.value
+            needs = ", ".join(sorted(marked | others)) or _imported(error)
+            if needs:
+                _skip(report, needs)
+        elif report.when == "call" and report.outcome == "passed" and marked:
+            report.outcome = "failed"
+            report.longrepr = f"says that it needs {', '.join(sorted(marked))}, and passes without"
     return report

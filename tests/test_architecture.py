@@ -21,9 +21,10 @@ STRANGE = {"examples", "tests", "benchmarks"}
 ORDER = (
     "vrs",
     # The robots.
-    "robots.solids", "robots.base", "robots.robot", "robots.driver", "robots.chain", "robots.vehicle",
-    "robots.description", "robots.bullet", "robots.mujoco", "robots.drives", "robots.onboard", "robots.simulated",
-    "robots.mobile", "robots.described", "robots.ipr", "robots.puma560", "robots.cubo", "robots",
+    "robots.solids", "robots.rooms", "robots.base", "robots.robot", "robots.driver", "robots.chain",
+    "robots.vehicle", "robots.things", "robots.description", "robots.bullet", "robots.mujoco", "robots.drives",
+    "robots.onboard", "robots.simulated", "robots.mobile", "robots.described", "robots.ipr",
+    "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.pipes", "interfaces.timer", "interfaces.messages",
     # The network; what is asked of a personal robot.

@@ -12,6 +12,7 @@ from robots.described import DescribedRobot, split
 from robots.described import described as examined
 from robots.description.description import JointKind
 from robots.robot import described
+from robots.simulated import missing_for
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def _facts(found: DescribedRobot) -> dict[str, Any]:
         "robot": robot.name,
         "file": split(robot.found_by)[0],
         "kind": "mobile robot" if robot.is_base else "arm",
+        "bodies": [{"name": name, "missing": missing_for(name) or None} for name in robot.body_names],
         "notes": list(found.notes),
         "to_state": list(found.to_state),
         "state_in": None if found.stated is None else str(found.stated),
@@ -136,12 +138,19 @@ def _show(found: DescribedRobot) -> None:
             console.print(f"{joint.name} mimics another: {says}")
         if description.poses:
             console.print(f"poses: {', '.join(description.poses)}")
+    console.print(f"bodies: {', '.join(map(_body, facts['bodies']))}")
     for note in found.notes:
         console.print(f"- {note}")
     if found.to_state:
         into = "as more numbers" if found.stated is None else f"in {found.stated}"
         console.print(f"To state what's assumed, {into}:")
         console.print("\n".join(f"    {line}".rstrip() for line in found.to_state))
+
+
+def _body(body: dict[str, str | None]) -> str:
+    return (
+        f"{body['name']} (needs {body['missing']}, which isn't installed)" if body["missing"] else f"{body['name']}"
+    )
 
 
 def _table(found: DescribedRobot) -> Any:

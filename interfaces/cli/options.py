@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
     from interfaces.val2.values import Dialect
-    from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
+    from robots.rooms import Room
 
 
 def option(spelled: str, text: str, **more: Any) -> Any:
@@ -297,8 +297,8 @@ def room_of(text: str) -> Room:
         InvalidValueError: If there's neither a room of that name nor such a file.
         FormatError: If the file can't be read.
     """
-    from robots.bullet.rooms import load_room
     from robots.mobile.robot import PLACES, place
+    from robots.rooms import load_room
 
     if text in PLACES:
         return place(text)

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveBody, LiveRobot
-    from robots.bullet.rooms import Room
+    from robots.rooms import Room
 
 
 def thin_client(
@@ -236,7 +236,7 @@ def robot(
         from interfaces.runtime.live.physics_body import PhysicsBody
         from interfaces.runtime.physics import PhysicsConfig
         from interfaces.teleop import RobotHostConfig, RobotSiteConfig
-        from robots.bullet.things import read_scene
+        from robots.things import read_scene
 
         model = chosen.arm
         q = home(model) if pose == POSE else model.poses[one_of("pose", pose, sorted(model.poses))]

@@ -75,7 +75,7 @@ def run(
     from interfaces.val2.playing import Listeners
     from interfaces.val2.source import joined
     from interfaces.val2.twins import play
-    from robots.bullet.things import read_scene
+    from robots.things import read_scene
 
     profile = delay_profile(delay)
     D, order = fixed_offset(offset, profile), Conditions(service=service).service  # type: ignore[arg-type]

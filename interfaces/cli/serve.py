@@ -64,9 +64,9 @@ if TYPE_CHECKING:
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
     from interfaces.stream.join import JoinPages
-    from robots.bullet.rooms import Room
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
+    from robots.rooms import Room
     from vrs.clock import Clock
 
 
@@ -154,8 +154,8 @@ def serve(
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.teleop.architectures import architecture as makes
     from robots.bullet.grasping import fingered
-    from robots.bullet.things import read_scene
     from robots.onboard.watchdog import LossPolicy
+    from robots.things import read_scene
 
     names = names or [USUAL]
     if tip and len(names) > 1:

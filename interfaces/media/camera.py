@@ -12,9 +12,9 @@ from typing import Final, TypeAlias
 
 from interfaces.media.messages import NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.pipes import HEAD, start
-from robots.bullet.rooms import Room
 from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
 from robots.robot import USUAL_BASE
+from robots.rooms import Room
 from vrs.checks import number_in
 from vrs.clock import Clock
 from vrs.errors import FormatError, VrsError

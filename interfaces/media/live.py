@@ -13,7 +13,7 @@ from interfaces.media.coding import VoicePlayout, missing
 from interfaces.media.offer import OfferError
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import PROGRAM, SpeechError, cleaned, program
-from robots.bullet.rooms import Room
+from robots.rooms import Room
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
 

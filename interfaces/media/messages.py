@@ -7,8 +7,8 @@ from typing import Final, TypeAlias, TypeVar
 import msgspec
 
 from interfaces.pipes import framed
-from robots.bullet.rooms import Room
 from robots.mobile.camera import Lens
+from robots.rooms import Room
 from vrs.errors import FormatError
 
 MESSAGE_MOST: Final = 1 << 24

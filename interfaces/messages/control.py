@@ -35,9 +35,9 @@ from interfaces.messages.fields import (
     Value,
     Word,
 )
-from robots.bullet.things import MOST_SCENE_THINGS, Scene, ThingPose
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.lease import LeaseEnd, LeaseState
+from robots.things import MOST_SCENE_THINGS, Scene, ThingPose
 from vrs.checks import sized_array
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import DriveLimits

@@ -30,8 +30,8 @@ from interfaces.messages.fields import (
     Word,
 )
 from interfaces.messages.segments import MOST_POWERS, placed, written
-from robots.bullet.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
-from robots.bullet.things import MOST_SCENE_THINGS, Scene, ThingPose
+from robots.rooms import MOST_THINGS, Block, Column, Door, Length, Person, Room, Size
+from robots.things import MOST_SCENE_THINGS, Scene, ThingPose
 from vrs.commands import Command, MotionCommand, Profile
 from vrs.errors import FormatError, InvalidValueError
 from vrs.ledger import LedgerEntry, Receipt

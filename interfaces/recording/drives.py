@@ -21,7 +21,7 @@ from interfaces.recording.capture import Capture
 from interfaces.recording.history import placed
 from interfaces.teleop import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
-from robots.bullet.rooms import EMPTY, Room
+from robots.rooms import EMPTY, Room
 from vrs.clock import ManualClock
 from vrs.mobile import wrapped
 

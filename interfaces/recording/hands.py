@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import Any
 
 from interfaces.messages.recording import HandEntry, SceneEntry
-from robots.bullet.things import Scene, ThingPose
+from robots.things import Scene, ThingPose
 
 _AT = attrgetter("t")
 

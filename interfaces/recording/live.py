@@ -38,8 +38,8 @@ from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.connection import SiteLine
 from interfaces.teleop.samples import PERIOD
 from interfaces.teleop.virtual_base import VirtualBase
-from robots.bullet.rooms import Room
-from robots.bullet.things import Scene, ThingPose, has_moved
+from robots.rooms import Room
+from robots.things import Scene, ThingPose, has_moved
 from vrs.ledger import Receipt, Status
 from vrs.timeline import Timeline
 

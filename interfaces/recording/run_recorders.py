@@ -47,11 +47,11 @@ from interfaces.teleop import OperatorSite, VirtualArm
 from interfaces.teleop.architectures import ArchitectureOperatorSite
 from interfaces.teleop.architectures.compositions import CONTROL, grid_of
 from robots.bullet.grasping import HandState
-from robots.bullet.rooms import EMPTY
-from robots.bullet.things import ThingPose, has_moved
 from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE
+from robots.rooms import EMPTY
+from robots.things import ThingPose, has_moved
 from vrs.commands import Lateness
 from vrs.errors import FormatError
 from vrs.mobile import Grid

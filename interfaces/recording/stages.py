@@ -14,7 +14,7 @@ from interfaces.recording.recording import Recording
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.teleop.predicted_grasp import Hands, PredictedGrasp
-from robots.bullet.things import Scene
+from robots.things import Scene
 from vrs.model import Array
 
 MARGIN = 3.0

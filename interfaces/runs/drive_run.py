@@ -12,11 +12,11 @@ from interfaces.messages.recording import Direction
 from interfaces.messages.sites import DriveOrders, DriveReport
 from interfaces.teleop.architectures import ArchitectureOperatorSite, Constants, Transport
 from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS
-from robots.bullet.rooms import Room
 from robots.mobile.chassis import MobileReality
 from robots.mobile.robot import PLACES, Collision, MobileRobot
 from robots.onboard.driving import Posture
 from robots.robot import BARE, USUAL_BASE, Robot, load
+from robots.rooms import Room
 from vrs.checks import one_of, validated, within
 from vrs.comparison import PathComparison, PathMatch, match_paths, summed_up
 from vrs.model import Array

@@ -16,8 +16,8 @@ from interfaces.link.delays import MAX_DELAY
 from interfaces.messages.recording import Begin, CommandPacket, RunEvent
 from interfaces.teleop import Correction, OperatorSite, VirtualArm
 from robots.bullet.grasping import HandState
-from robots.bullet.things import Scene
 from robots.robot import Robot
+from robots.things import Scene
 from vrs.clock import ManualClock
 from vrs.commands import Cancel, Command, InsertVia, Lateness, Retime
 from vrs.comparison import measured_rows

@@ -35,8 +35,8 @@ from interfaces.runtime.physics_messages import (
 )
 from interfaces.teleop import JointReference, RobotHost
 from robots.bullet.grasping import fingered
-from robots.bullet.things import Scene
 from robots.robot import IDEAL, Robot, is_driver
+from robots.things import Scene
 from vrs.checks import finite_array, number_in, validated, within
 from vrs.clock import WallClock
 from vrs.errors import InvalidValueError, VrsError

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from robots.bullet.grasping import HandState
-from robots.bullet.things import Scene
+from robots.things import Scene
 from vrs.errors import FormatError
 from vrs.model import Array, Limits
 

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from interfaces.system import read_within
-from robots.bullet.things import Scene, Thing
+from robots.things import Scene, Thing
 from vrs.checks import one_of
 from vrs.commands import (
     Grip,

@@ -37,8 +37,8 @@ from interfaces.runtime.plan import PlannedCommand, PlannedMotion, RunPlan
 from interfaces.system import software
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots.bullet.grasping import grasping
-from robots.bullet.things import Scene
 from robots.robot import ArmBody, Robot, exact_arm
+from robots.things import Scene
 from vrs import Engine, Lateness, Receipt, Status
 from vrs.model import Array
 from vrs.timeline import Timeline

@@ -27,11 +27,11 @@ from interfaces.teleop.connection import Host, HostConfig
 from interfaces.teleop.robot import AdaptiveOffset, OffsetConfig, RobotSite
 from interfaces.teleop.samples import SampleLog
 from robots.bullet.grasping import HandState
-from robots.bullet.things import ThingPose, has_moved
 from robots.onboard.following import SensorMonitor, Violation, too_far
 from robots.onboard.playout import EvenPlay, Playout, PlayoutConfig, PlayState, play_of
 from robots.onboard.servo import from_commanded
 from robots.onboard.watchdog import StopReason, WatchdogConfig
+from robots.things import ThingPose, has_moved
 from vrs.checks import finite, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import Profile

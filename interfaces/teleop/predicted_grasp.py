@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from robots.bullet.grasping import moving
-from robots.bullet.things import Scene, ThingPose, pose_matrix
 from robots.robot import Fingers, Gripper
+from robots.things import Scene, ThingPose, pose_matrix
 from vrs.model import Array
 from vrs.scheduler import HandGoal
 

@@ -30,7 +30,7 @@ from interfaces.teleop.operator import (
     text_of,
 )
 from interfaces.teleop.samples import Gathering
-from robots.bullet.things import ThingPose
+from robots.things import ThingPose
 from vrs.checks import number_in, validated, within
 from vrs.clock import ManualClock
 from vrs.commands import (

@@ -18,8 +18,8 @@ from interfaces.val2.motion import Arm, SiteRobot, conventions_of
 from interfaces.val2.playing import Listeners, Player
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
-from robots.bullet.things import Scene
 from robots.robot import Robot
+from robots.things import Scene
 from vrs.commands import Command, Grip, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt, Status
 from vrs.model import home

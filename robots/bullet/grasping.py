@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
-from robots.bullet.things import Scene, Thing, ThingPose
 from robots.bullet.world import LostError, World
 from robots.chain import quaternion
 from robots.robot import ArmBody, ArmMaker, Closing, Fingers, Gripper, Measured, Prepared, Robot
+from robots.things import Scene, Thing, ThingPose
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 

@@ -13,10 +13,10 @@ import math
 import numpy as np
 from typing_extensions import override
 
-from robots.bullet.rooms import Room
 from robots.bullet.world import CHASSIS, FLOOR, THING, WHEEL, RoomBodies, World
 from robots.chain import quaternion
 from robots.robot import Closing
+from robots.rooms import Room
 from robots.vehicle import (
     BODY_FRICTION,
     DRIVES,

@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.bullet.rooms import Room
 from robots.cubo import parameters as p
 from robots.mobile.body import MobileBody
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
 from robots.mobile.position import FusedPosition, TruePosition
-from robots.simulated import WORLDS
+from robots.rooms import Room
+from robots.simulated import USUAL_WORLD
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
 from vrs.mobile import clipped
@@ -46,7 +46,7 @@ class CuboBody(MobileBody):
         self,
         posture: ArrayLike | None = None,
         *,
-        world: str = next(iter(WORLDS)),
+        world: str = USUAL_WORLD,
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,

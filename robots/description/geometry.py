@@ -146,14 +146,14 @@ class Compiled:
     def __init__(self, chain: Geometry) -> None:
         """Compile them."""
         import roboticstoolbox as rtb
-        from roboticstoolbox.ets import fknm
+        from roboticstoolbox import _fknm_c as functions
 
         X, parts = np.eye(4), []
         for before, axis, slides in zip(chain.X, chain.axes, chain.slides, strict=True):
             align = _aligned(axis)
             parts += [rtb.ET.SE3(X @ before @ align), rtb.ET.tz() if slides else rtb.ET.Rz()]
             X = align.T
-        self._library = fknm
+        self._library = functions
         self._whole = rtb.ETS([*parts, rtb.ET.SE3(X @ chain.tip)])
         self._ets = self._whole._fknm
         self._gains = chain.gains if chain.follows else None
@@ -189,10 +189,10 @@ class Compiled:
         return np.asarray(q) if found else None
 
     def _values(self, q: Array) -> Array:
-        """Values of all joints, (N,), writeable, as the library asks."""
+        """Values of all joints, (N,), in a row and writeable, as the library asks."""
         if self._gains is not None:
             return np.asarray(self._gains @ q + self._offsets)
-        return q if q.flags.writeable else q.copy()
+        return q if q.flags.carray else q.copy()
 
 
 @lru_cache(maxsize=16)

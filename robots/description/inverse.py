@@ -23,7 +23,7 @@ from robots.description.geometry import Geometry, compiled
 from vrs.errors import UnreachablePoseError
 from vrs.model import Array, Limits, for_people
 from vrs.planning.path import rotation_vector
-from vrs.planning.redundancy import TASK, stiffness, stretched, units
+from vrs.planning.redundancy import TASK, scaled, stiffness, stretched, units
 
 RESIDUAL: Final = 1e-9
 """How far from its pose a solution may be [m, rad]."""
@@ -158,7 +158,7 @@ class Inverse:
             if guess is None:
                 continue
             if self._full:
-                there = self._inside(X, guess, start) if within_limits else guess
+                there = self._inside(X, guess, start) if within_limits else self._corrected(X, guess)
             else:
                 there = self.settled(X, guess, stretched(start, self._limits), rough=_ROUGH)
                 if there is not None and within_limits and self._violated(there := self._turned_to(there, start)):
@@ -200,12 +200,15 @@ class Inverse:
                 yield self._samples[k]
 
     def _guess(self, X: Array, start: Array, q: Array, rows: int = TASK) -> Array | None:
-        """Joint values of a pose, or of its position alone, found from a start, on the turns nearest to q."""
+        """Joint values of a pose, or of its position alone, found from a start, on the turns nearest to q.
+
+        Those of a redundant arm are close to it, as `_admitted` leads them elsewhere.
+        """
         if self._chain.follows:
             there = self.settled(X, start, stretched(start, self._limits), rough=_STEPS)
         else:
             there = compiled(self._chain).solve(X, start, _MASKS[rows])
-            if there is not None and self._full:
+            if there is not None and self._full and not self._redundant:
                 there = self._corrected(X, there)
         return None if there is None else self._turned_to(there, q)
 
@@ -250,13 +253,17 @@ class Inverse:
         """Joint values of a pose, if within the limits; a redundant arm's are led away from them."""
         if self._violated(q):
             return None
-        if not self._redundant or float(stiffness(q, self._limits).max()) < stiff:
+        if not self._redundant:
             return q
-        there = self.settled(
-            X, q, stretched(near, self._limits), rough=_ROUGH if stiff > _STIFF else 1, within=_ROUGHLY
-        )
-        there = None if there is None else self._corrected(X, there)
-        return q if there is None or self._violated(there) else there
+        if float(stiffness(q, self._limits).max()) >= stiff:
+            there = self.settled(
+                X, q, stretched(near, self._limits), rough=_ROUGH if stiff > _STIFF else 1, within=_ROUGHLY
+            )
+            there = None if there is None else self._corrected(X, there)
+            if there is not None and not self._violated(there):
+                return there
+        there = self._corrected(X, q)
+        return None if there is None or self._violated(there) else there
 
     def _inside(self, X: Array, q: Array, near: Array) -> Array | None:
         """Joint values of a pose within the limits; of a redundant arm those that pass them are held at them."""
@@ -341,8 +348,10 @@ class Inverse:
         self, q: Array, J: Array, M: Array, c: Array, wanted: Array, *, exact: bool
     ) -> tuple[Array, Array]:
         """Hessian, (n, n), and gradient, (n,), of what is least: distance from what is wanted, or the turn."""
-        H = np.diag(self._weight * stiffness(q, self._limits))
-        slope = self._weight * (stretched(q, self._limits) - wanted)
+        scale, stiff = scaled(q, self._limits)
+        H = np.zeros((self._n, self._n))
+        H.flat[:: self._n + 1] = self._weight * stiff
+        slope = self._weight * (scale - wanted)
         if self._full:
             return H, slope
         w = J[3:]
@@ -419,7 +428,7 @@ def _sine(M: Array) -> tuple[float, float, float]:
 def _linear(A: Array, b: Array) -> Array:
     """Solve equations; the least solution where they have several, or none."""
     _, _, x, info = lapack.dgesv(A, b)
-    if info or not np.abs(x).max() < 1e6:
+    if info or not float(x @ x) < 1e12:
         if not np.isfinite(A).all():
             return np.full(len(b), np.nan)
         x = np.linalg.lstsq(A, b, rcond=1e-9)[0]

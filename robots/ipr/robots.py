@@ -18,7 +18,7 @@ from robots.solids import LinkShape
 
 
 def _robot(kind: Kind, body: Chassis, shapes: Callable[[], Sequence[LinkShape]], *devices: object) -> Robot:
-    return Robot(kind, model(kind), Appearance(shapes, partial(links, body)), bodies_of(body), devices)
+    return Robot(kind.value, model(kind), Appearance(shapes, partial(links, body)), bodies_of(body), devices)
 
 
 ROBOT: Final = _robot(

@@ -14,8 +14,8 @@ from typing import Annotated
 
 import numpy as np
 
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.floor_plan import CELL, Ways
+from robots.rooms import Room, read_room
 from vrs.checks import validated, within
 from vrs.errors import InvalidValueError
 

@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from robots.base import PERIOD
-from robots.bullet.rooms import Room
 from robots.bullet.world import LostError, WorldClosedError
 from robots.chain import Inertia, together
 from robots.mobile.chassis import Chassis, MobileReality, Senses
 from robots.mobile.robot import BareBody, MobileRobot
 from robots.robot import BARE
-from robots.simulated import WORLDS
+from robots.rooms import Room
+from robots.simulated import USUAL_WORLD, WORLDS
 from robots.vehicle import Cargo, RigidVehicle, Vehicle, VehiclePart, Wheel
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits
@@ -126,7 +126,7 @@ class MobileBody(MobileRobot):
         chassis: Chassis,
         posture: ArrayLike | None = None,
         *,
-        world: str = next(iter(WORLDS)),
+        world: str = USUAL_WORLD,
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,

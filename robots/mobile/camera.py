@@ -17,10 +17,10 @@ import numpy as np
 from msgspec import Meta
 
 from robots.base import upright
-from robots.bullet.rooms import EMPTY, Room, is_wall
-from robots.bullet.world import Picture, Studio
+from robots.mobile.renderer import Picture, Renderer
 from robots.mobile.shapes import GROUND, box, door_shape, person_shape, room_shapes
 from robots.robot import HeadCamera
+from robots.rooms import EMPTY, Room, is_wall
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within
 from vrs.errors import InvalidValueError
@@ -155,7 +155,7 @@ _MOST_TILES: Final = 4000
 
 
 class Sight:
-    """Draws a room as the robot's camera sees it; `close` it in the end."""
+    """Draws a room as the robot's camera sees it."""
 
     def __init__(self, room: Room, camera: HeadCamera, lens: Lens | None = None) -> None:
         """Build the room once.
@@ -166,23 +166,19 @@ class Sight:
             lens: What it sees of what is before it.
         """
         self.lens = Lens() if lens is None else lens
-        self._room, self._camera, self._studio = room, camera, Studio()
+        self._room, self._camera, self._renderer = room, camera, Renderer()
         self._endless = room == EMPTY
         if self._endless:
             self._floor = self._tile((-_AROUND, -_AROUND), (_AROUND, _AROUND), TILE)
         else:
             self._tile((0.0, 0.0), (room.length, room.width), _tile_side(room))
             self._cover()
-        add = self._studio.add
+        add = self._renderer.add
         _, *things = room_shapes(room)
         self._things = [(add(shape), thing) for shape, thing in zip(things, room.things, strict=True)]
         self._doors = [(add(door_shape(door)), door) for door in room.doors]
         self._people = [(add(person_shape(person)), person) for person in room.people]
         self._body = add(camera.body())
-
-    def close(self) -> None:
-        """Let the renderer go; a second call does nothing."""
-        self._studio.close()
 
     def draw(self, posture: tuple[float, float, float], look: Look, t: float) -> Picture:
         """Draw what is seen.
@@ -192,7 +188,7 @@ class Sight:
             look: Where its camera looks.
             t: Time in the room [s]: who walks in it, and what stands.
         """
-        X_WR, place = upright(*posture), self._studio.place
+        X_WR, place = upright(*posture), self._renderer.place
         if self._endless:
             # By whole pairs of tiles: the floor seems to lie still.
             x, y = (2 * TILE * round(part / (2 * TILE)) for part in posture[:2])
@@ -207,7 +203,7 @@ class Sight:
             place(figure, upright(*person.at(t), 0.0))
         place(self._body, X_WR)
         lens = self.lens
-        return self._studio.draw(
+        return self._renderer.draw(
             X_WR @ lens_pose(look, self._camera),
             width=lens.width,
             height=lens.height,
@@ -227,7 +223,7 @@ class Sight:
         shade = np.repeat(np.where(odd, _JOINT, 1.0), 2)[:, None]
         ground = np.array(GROUND)
         vertices = np.column_stack([corners, np.zeros(len(corners))])
-        return self._studio.add(LinkShape("floor", vertices, faces, ground, shade * ground))
+        return self._renderer.add(LinkShape("floor", vertices, faces, ground, shade * ground))
 
     def _cover(self) -> None:
         """Put a ceiling on the highest walls, if there are any."""
@@ -237,7 +233,7 @@ class Sight:
         build = Builder("ceiling", _CEILING)
         z = max(walls)
         build.add(box((-0.1, -0.1, z), (self._room.length + 0.1, self._room.width + 0.1, z + 0.02)))
-        self._studio.add(build.shape())
+        self._renderer.add(build.shape())
 
 
 def _tile_side(room: Room) -> float:

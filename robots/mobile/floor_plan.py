@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.bullet.rooms import Block, Column, Room
 from robots.onboard.gsp_map import GspMap, Lines
+from robots.rooms import Block, Column, Room
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array

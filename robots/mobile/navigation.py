@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from robots.base import Footprint
-from robots.bullet.rooms import Room
 from robots.mobile.robot import MobileRobot
 from robots.onboard.avoidance import AvoidanceConfig, Outline, SonarMount
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoversConfig, YieldingConfig
 from robots.onboard.navigator import CELL, Navigator
 from robots.onboard.routes import RouteConfig, RouteMap
+from robots.rooms import Room
 from vrs.mobile import Grid
 from vrs.mobile.model import placed
 from vrs.model import Array

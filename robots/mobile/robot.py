@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from typing_extensions import override
 
 from robots.base import PERIOD
-from robots.bullet.rooms import EMPTY, Room, load_room
 from robots.mobile.chassis import Chassis, MobileReality, Senses, centre_of
 from robots.mobile.drive_train import DriveTrain, Odometry, as_posture
 from robots.mobile.floor_plan import FloorPlan
@@ -21,6 +20,7 @@ from robots.mobile.sensing import Fix, LaserScanner, OverheadCamera, SonarRing, 
 from robots.onboard.following import SensorWatch
 from robots.onboard.laser import LaserScan
 from robots.robot import Closing
+from robots.rooms import EMPTY, Room, load_room
 from vrs.checks import finite, integer_in, one_of
 from vrs.errors import InvalidValueError
 from vrs.mobile import DriveLimits

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robots.base import upright
-from robots.bullet.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.mobile.chassis import Chassis
 from robots.mobile.drive_train import as_posture
+from robots.rooms import Block, Column, Door, Person, Room, is_wall
 from robots.solids import Builder, LinkShape, drum, hull, lathe, loft
 from vrs.model import Array, frozen_array
 

@@ -16,10 +16,10 @@ from typing import Any, Final
 import numpy as np
 from typing_extensions import override
 
-from robots.bullet.rooms import Block, Room, Standing, moves, pose_at, solid
 from robots.chain import quaternion, rotation
 from robots.mujoco.chain import load_mujoco, w_first
 from robots.robot import Closing
+from robots.rooms import Block, Room, Standing, moves, pose_at, solid
 from robots.vehicle import (
     BODY_FRICTION,
     DRIVES,

@@ -12,7 +12,7 @@ from robots.chain import Chain, ChainLink, Inertia
 from robots.onboard.servo import ServoGains
 from robots.puma560 import dynamics
 from robots.puma560.parameters import DH_A, DH_ALPHA, DH_D, DOF, FLANGE, POSES
-from robots.simulated import Payload, Reality, SimulatedArm
+from robots.simulated import USUAL_WORLD, Payload, Reality, SimulatedArm
 
 _MASS: Final = (1.0, *dynamics.MASS[1:])
 _INERTIA: Final = ((0.35,) * 3, *dynamics.INERTIA[1:])
@@ -58,7 +58,7 @@ class RealArm(SimulatedArm):
         q: ArrayLike | None = None,
         payload: Payload | None = None,
         gains: ServoGains | None = None,
-        world: str = "bullet",
+        world: str = USUAL_WORLD,
     ) -> None:
         """Put the arm at rest; see `SimulatedArm`.
 

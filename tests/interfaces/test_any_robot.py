@@ -129,6 +129,7 @@ def test_its_recording_says_what_the_run_said(demo: Path, tmp_path: Path) -> Non
     assert last == pytest.approx([0.5, 0.05 - 2e-3, -1.0], abs=1e-6)
 
 
+@pytest.mark.needs("pybullet", "mujoco")
 def test_the_puma_follows_alike_in_both_worlds_of_physics(tmp_path: Path) -> None:
     (tmp_path / "plan.jsonl").write_text("""{"title": "Turn"}
 {"issue": 0.0, "execute": 0.5, "move": [30, 20, 10, 40, -30, 20], "speed": 0.8}

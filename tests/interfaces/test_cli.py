@@ -13,6 +13,7 @@ import time
 import pytest
 
 from interfaces.cli.main import exit_status
+from robots.simulated import WORLDS
 
 SHORT = '{"issue": 0, "move": [20, 50, -160, 0, 30, 0], "speed": 0.8}\n'
 
@@ -172,7 +173,7 @@ def test_ctrl_c_ends_with_130_and_one_line(tmp_path, how):
         (("robot", "--robot", "ipr", "--pose", "ready"), "pose"),
         (("robot", "--robot", "ipr", "--link-loss", "shrug"), "halt"),
         (("robot", "--body", "jelly"), "puma560"),
-        (("robot", "--robot", "ipr", "--body", "ideal"), "ipr must be one of bullet, mujoco, bare"),
+        (("robot", "--robot", "ipr", "--body", "ideal"), f"ipr must be one of {', '.join(WORLDS)}, bare"),
         (("serve", "--robot", "ipr", "--robot", "micro", "--body", "ideal"), "body of ipr must be one of"),
         (("reproduce", "doulgeri", "--body", "mujoco", "--out", "out"), "no robot in it has physics"),
         (("lab", "--robot", "ipr@jelly", "--out", "lab"), "body of ipr must be one of"),

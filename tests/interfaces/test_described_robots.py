@@ -14,6 +14,7 @@ import pytest
 
 from interfaces.cli.main import exit_status
 from interfaces.recording import open_recording
+from robots.simulated import WORLDS, missing_for
 from tests.interfaces.live_rig import child
 from tests.interfaces.station.opened import Page, station
 from tests.robots.description.stranger import write
@@ -60,9 +61,25 @@ def test_a_check_says_what_is_there_what_is_assumed_and_how_it_is_stated(robot: 
     assert re.search(r"elbow +-180°\* +180°\* +57\.3°\*", said)
     facts = json.loads(vrs("check", robot, "--json", "--tip", "lamp"))
     assert (facts["kind"], facts["tip"], facts["driven"]) == ("arm", "lamp", ["pan", "tilt"])
+    assert [body["name"] for body in facts["bodies"]] == [*WORLDS, "ideal"]
     assert {joint["name"]: joint["upper"] for joint in facts["joints"]}["grip"] == 0.03
     husky = json.loads(vrs("check", bullet_data(HUSKY), "--json"))
     assert (husky["kind"], husky["wheelbase_m"]) == ("mobile robot", pytest.approx(0.5708))
+
+
+def test_a_check_lists_its_bodies_and_says_what_one_needs_that_is_not_installed(
+    robot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("interfaces.cli.check_robot.missing_for", lambda _: "")
+    assert f"bodies: {', '.join(WORLDS)}, ideal\n" in vrs("check", robot)
+    assert f"bodies: {', '.join(WORLDS)}, bare\n" in vrs("check", DIFF)
+    monkeypatch.setattr("robots.simulated.find_spec", lambda name: None if name == "mujoco" else name)
+    monkeypatch.setattr("interfaces.cli.check_robot.missing_for", missing_for)
+    assert "mujoco (needs mujoco, which isn't installed)" in vrs("check", robot)
+    facts = json.loads(vrs("check", robot, "--json"))
+    assert {body["name"]: body["missing"] for body in facts["bodies"]} == {
+        "bullet": None, "mujoco": "mujoco", "ideal": None
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,8 @@ from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
 from robots.bullet.grasping import HandState, fingered
-from robots.bullet.things import Scene, Thing, read_scene
 from robots.robot import exact_arm
+from robots.things import Scene, Thing, read_scene
 from tests.interfaces.own_arm import ROBOT as CRANE
 from tests.interfaces.ticks import LIMITS, MODEL, NOMINAL, ROBOT, TICK, standing
 from vrs import Engine, Grip, JointTarget, ManualClock, MotionCommand, WallClock

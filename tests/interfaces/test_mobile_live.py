@@ -40,10 +40,11 @@ from interfaces.teleop.architectures.compositions import CONTROL
 from interfaces.teleop.following_base import DrivenConfig
 from interfaces.teleop.virtual_base import VirtualBase
 from robots import load
-from robots.bullet.rooms import EMPTY
 from robots.mobile.robot import place
 from robots.onboard.journey import Goal, JourneyState
 from robots.robot import IDEAL
+from robots.rooms import EMPTY
+from robots.simulated import WORLDS, missing_for
 from tests.contract import doors
 from tests.interfaces.stream.served import served
 from tests.interfaces.stream.serving import Serving, beside
@@ -64,14 +65,15 @@ async def listening(robot: LiveRobot) -> AsyncIterator[str]:
         yield f"ws://127.0.0.1:{port}/site"
 
 
-WORLDS = {OperatorLoss.STOP: "bullet", OperatorLoss.CARRY_ON: "mujoco"}
+INSTALLED = [world for world in WORLDS if not missing_for(world)]
+WORLD_OF = {OperatorLoss.STOP: INSTALLED[0], OperatorLoss.CARRY_ON: INSTALLED[-1]}
 """In which world of physics the robot drives."""
 
 
 @asynccontextmanager
 async def both(loss: OperatorLoss, jobs: Path) -> AsyncIterator[Serving]:
     """Robot and operator's site in one loop; no watchdog, as other tests share the processor."""
-    robot = ROBOT.with_body(WORLDS[loss])
+    robot = ROBOT.with_body(WORLD_OF[loss])
     config = PacedConfig(robot, ROOM, driven=DrivenConfig(period=CONTROL), jobs=RunnerConfig(loss=loss))
     async with listening(LiveRobot(PacedBody(config), Access(free={Role.SITE}))) as url:
         at = sockets.bind("127.0.0.1", 0)
@@ -237,6 +239,7 @@ def test_an_operator_takes_no_other_robot_and_no_other_room(other: str) -> None:
     )
 
 
+@pytest.mark.needs("mujoco")
 def test_a_program_for_the_arm_is_a_job_of_a_served_robot(tmp_path: Path) -> None:
     wave = ".PROGRAM wave()\n    DRIVE 1, 5, 50\n.END\n"
     with (

@@ -246,7 +246,7 @@ def test_the_puma_follows_in_its_process_and_carries_a_load(clock: WallClock, bo
 @pytest.mark.parametrize("friction", [True, False])
 def test_a_puma_has_friction_if_that_is_asked_for(friction: bool) -> None:
     bounds: Any = (tuple(map(tuple, (LIMITS.q_min, LIMITS.q_max, LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max))),)
-    setup = PhysicsSetup("puma560", "bullet", friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
+    setup = PhysicsSetup("puma560", ROBOT.usual_body, friction, 0.002, 1, 0.0, 1, tuple(NOMINAL), *bounds)
     with tick_body(setup) as body, ROBOT.body()(NOMINAL, friction=friction) as arm:
         for made in (body.arm, arm):  # type: ignore[attr-defined]
             reality = made.reality

@@ -26,8 +26,8 @@ from interfaces.runtime.live.base_twins import ROUTE_SPEED, route_timeline
 from interfaces.runtime.live.task_desk import TOO_LONG, TaskDesk
 from interfaces.stream.codec import News
 from interfaces.teleop.operator import HaltCause
-from robots.bullet.rooms import Block, Place, Room
 from robots.onboard.journey import Goal, JourneyState
+from robots.rooms import Block, Place, Room
 from tests.interfaces.teleop.rig import MODEL, Rig
 
 ROOM = Room("Test", 8.0, 6.0, places=(Place("A", 1.0, 2.0, 0.5), Place("B", 2.5, 3.0)), via=((2.0, 2.0),))

@@ -3,9 +3,12 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
+import pytest
+
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "physics.py"
 
 
+@pytest.mark.needs("pybullet")
 def test_the_arm_is_fast_enough_beside_a_bare_bullet_loop() -> None:
     spec = importlib.util.spec_from_file_location("physics_benchmark", BENCHMARK)
     assert spec is not None

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from robots import load
 from robots.bullet.grasping import GraspingArm, GraspWorld, finger_poses, fingered, grasping
-from robots.bullet.things import Scene, Thing, pose_matrix, read_scene
 from robots.robot import ArmBody, Fingers, exact_arm
+from robots.things import Scene, Thing, pose_matrix, read_scene
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 

@@ -12,7 +12,7 @@ import pytest
 
 import robots
 from robots.robot import EXACT, FOUND, IDEAL, Display, Gripper, HeadCamera, Robot, ThinClient
-from robots.simulated import WORLDS
+from robots.simulated import WORLDS, missing_for
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import MobileModel
 from vrs.model import RobotModel
@@ -27,7 +27,7 @@ def test_each_robot_is_found_by_its_name_and_stands_where_its_shapes_are_told(na
     assert robot.appearance is not None
     where = np.zeros(robot.arm.limits.dof if name in ARMS else 3)
     assert robot.appearance.poses(where).shape == (len(robot.appearance.shapes()), 4, 4)
-    assert next(iter(robot.bodies)) == (next(iter(WORLDS)) if name in ARMS else "bullet")
+    assert tuple(robot.bodies)[: len(WORLDS)] == tuple(WORLDS)
     assert isinstance(robot.model, RobotModel if name in ARMS else MobileModel)
 
 
@@ -54,24 +54,25 @@ def test_an_arms_bodies_follow_and_hold_loads() -> None:
     robot = robots.load("puma560")
     q = robot.arm.poses["ready"]
     still = np.tile(q, (20, 1)), np.zeros((20, 6)), np.zeros((20, 6))
-    for name in ("bullet", "mujoco", IDEAL):
+    for name in (*(world for world in WORLDS if not missing_for(world)), IDEAL):
         with robot.body(name)(q, friction=False) as body:
             body.attach(2.5)
             measured = body.follow(body.prepare(*still))
             body.release()
         assert measured.q.shape == (20, 6)
         assert np.abs(measured.q - q).max() == pytest.approx(0.0 if name == IDEAL else 1e-3, abs=1e-3)
-    assert robot.usual_body == "bullet"
-    assert robot.body() is robot.bodies["bullet"]
+    assert robot.usual_body == next(iter(WORLDS))
+    assert robot.body() is robot.bodies[robot.usual_body]
     assert Robot("bare", robot.model).usual_body == IDEAL
-    with pytest.raises(InvalidValueError, match="puma560 must be one of bullet, mujoco, ideal; given: 'jelly'"):
+    worlds = ", ".join(WORLDS)
+    with pytest.raises(InvalidValueError, match=f"puma560 must be one of {worlds}, ideal; given: 'jelly'"):
         robot.body("jelly")
     assert robot.with_body("mujoco").usual_body == "mujoco"
     assert robot.with_body(EXACT).body() is robot.body(IDEAL)
     assert set(robot.with_body("mujoco").bodies) == set(robot.bodies)
     assert robot.body_name(EXACT) == robot.body_name(IDEAL) == IDEAL
     assert robot.body(EXACT) is robot.body(IDEAL)
-    with pytest.raises(InvalidValueError, match="one of bullet, mujoco, bare"):
+    with pytest.raises(InvalidValueError, match=f"one of {worlds}, bare"):
         robots.load("ipr").body(EXACT)
 
 

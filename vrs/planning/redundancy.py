@@ -28,24 +28,23 @@ def stretched(q: Array, limits: Limits) -> Array:
 
     It's the integral of `stiffness`.
     """
-    x, half = _shares(q, limits)
-    y = x * x
-    y *= y
-    return np.asarray(half * (x + _STEEP * (y * y * x)))
+    return scaled(q, limits)[0]
 
 
 def stiffness(q: Array, limits: Limits) -> Array:
     """How much dearer a joint's motion is where it is than amid its range, (n,) or (k, n): 1 to 91 at a limit."""
-    x, _ = _shares(q, limits)
+    return scaled(q, limits)[1]
+
+
+def scaled(q: Array, limits: Limits) -> tuple[Array, Array]:
+    """Return both, `stretched` and `stiffness`."""
+    half = 0.5 * (limits.q_max - limits.q_min)
+    # From -1 at the lower limit to 1 at the upper one.
+    x = (q - limits.q_min) / half - 1.0
     y = x * x
     y *= y
-    return np.asarray(1.0 + 9.0 * _STEEP * (y * y))
-
-
-def _shares(q: Array, limits: Limits) -> tuple[Array, Array]:
-    """Where joints are, from -1 at the lower limit to 1 at the upper one, and half of their ranges."""
-    half = 0.5 * (limits.q_max - limits.q_min)
-    return (q - limits.q_min) / half - 1.0, half
+    y *= y
+    return half * (x + _STEEP * (y * x)), 1.0 + 9.0 * _STEEP * y
 
 
 def units(prismatic: Collection[int], n: int, length: float) -> Array:

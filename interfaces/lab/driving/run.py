@@ -33,11 +33,11 @@ from interfaces.teleop.architectures.compositions import (
 from interfaces.teleop.following_base import DrivenConfig, FollowingBase
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
-from robots.bullet.rooms import Room
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.laser import LaserModel
+from robots.rooms import Room
 from vrs.errors import InvalidValueError
 
 AFTER = 5.0

@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 
 from interfaces.lab.goals.trial import TripSetting, seen_all
-from robots.bullet.rooms import Room
 from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.navigation import route_map
@@ -19,6 +18,7 @@ from robots.mobile.robot import place
 from robots.onboard.journey import Goal
 from robots.onboard.routes import Route, RouteMap
 from robots.robot import USUAL_BASE, load
+from robots.rooms import Room
 from vrs.errors import InvalidValueError
 from vrs.model import Array
 

@@ -29,11 +29,11 @@ from interfaces.lab.goals.scenes import FURNITURE, LATE, PEOPLE, PHYSICS, ROUND,
 from interfaces.lab.goals.trial import Aboard, Trip, seen_all, travel
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, draw, write_runs
 from interfaces.lab.statistics import Estimate, bootstrap, median
-from robots.bullet.rooms import Block, Column, Room
 from robots.mobile.navigation import route_config
 from robots.onboard.journey import JourneyState
 from robots.onboard.routes import RouteProblem
 from robots.robot import USUAL_BASE, load
+from robots.rooms import Block, Column, Room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

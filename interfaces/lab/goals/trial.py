@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robots.bullet.rooms import Room
 from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.navigation import BodyNavigator, route_map
 from robots.mobile.position import LaserPosition, OdometryPosition
@@ -19,6 +18,7 @@ from robots.onboard.laser import LaserModel
 from robots.onboard.navigator import Navigator
 from robots.onboard.routes import Route, RouteMap, RouteProblem
 from robots.robot import BARE, USUAL_BASE, load
+from robots.rooms import Room
 from vrs.mobile import wrapped
 from vrs.model import Array
 

@@ -46,13 +46,13 @@ from interfaces.messages.jobs import (
     VoiceJob,
     WaitJob,
 )
-from robots.bullet.rooms import Person, Room
 from robots.ipr.parameters import IPR
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import BareBody, place
 from robots.onboard.journey import GOING, Goal, JourneyState
 from robots.onboard.laser import LaserModel
 from robots.robot import USUAL_BASE, load
+from robots.rooms import Person, Room
 from robots.vehicle import Cargo
 from vrs.mobile import wrapped
 

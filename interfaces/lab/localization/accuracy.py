@@ -36,12 +36,12 @@ from interfaces.lab.localization.trial import (
     wander,
 )
 from interfaces.lab.output import BAD, GOOD, INK, MUTED, REAL, VIRTUAL, draw
-from robots.bullet.rooms import Room
 from robots.mobile.floor_plan import plan_map
 from robots.onboard.gsp_map import GspMap, Lines
 from robots.onboard.localization import LocalizationConfig, PaperLocalizer, weighted_update
 from robots.onboard.localizer import Localizer, LocalizerConfig
 from robots.onboard.map_building import MapBuilder
+from robots.rooms import Room
 from vrs.model import Array
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ from typing_extensions import override
 
 from interfaces.lab.claims import OWN_BAR, Cell, Findings, Results, Study, Table, all_of, at_least, at_most
 from interfaces.lab.localization.trial import CONTROL, PostureErrors, body_of, drive, setting, wander
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.global_localization import Candidate
 from robots.onboard.localizer import Localizer, LocalizerConfig, Status
 from robots.onboard.map_building import Surveyor
+from robots.rooms import Room, read_room
 from vrs.mobile import wrapped
 from vrs.model import Array
 

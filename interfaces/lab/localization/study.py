@@ -21,11 +21,11 @@ from interfaces.lab.localization.searching import (
 )
 from interfaces.lab.localization.trial import body_of, drive, setting
 from interfaces.lab.output import write_runs
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.floor_plan import plan_map
 from robots.onboard.driving import Drive
 from robots.onboard.localization import LocalizationConfig, Observability, Tracker, observability
 from robots.onboard.localizer import Localizer
+from robots.rooms import Room, read_room
 from vrs.checks import number_in
 from vrs.mobile import clipped
 from vrs.model import Array

@@ -9,7 +9,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robots.bullet.rooms import Room
 from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.floor_plan import Ways
@@ -21,6 +20,7 @@ from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer
 from robots.onboard.map_building import MapBuilder
 from robots.robot import BARE, USUAL_BASE, load
+from robots.rooms import Room
 from vrs.mobile import clipped, wrapped
 from vrs.model import Array
 

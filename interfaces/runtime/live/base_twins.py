@@ -22,10 +22,10 @@ from interfaces.teleop.architectures import OperatorSurroundings
 from interfaces.teleop.architectures.compositions import grid_of, operator_surroundings
 from interfaces.teleop.operator import Halt, HaltCause, OperatorSite
 from interfaces.teleop.virtual_base import DriveLine, VirtualBase
-from robots.bullet.rooms import EMPTY, Room
 from robots.onboard.driving import Posture
 from robots.onboard.routes import Point
 from robots.robot import Robot
+from robots.rooms import EMPTY, Room
 from vrs.mobile import ArcPiece, ArcTimeline, wrapped
 from vrs.mobile.model import advanced, braking
 

@@ -13,7 +13,7 @@ from interfaces.media import CameraConfig, LiveMedia, MediaDoor
 from interfaces.runtime.live.base_twins import BaseTwins
 from interfaces.stream.access import Access
 from interfaces.stream.hub import Hub
-from robots.bullet.rooms import Room
+from robots.rooms import Room
 from vrs.clock import Clock
 
 

@@ -36,11 +36,11 @@ from interfaces.stream.server import HubServer
 from interfaces.teleop import OperatorSiteConfig
 from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
-from robots.bullet.rooms import EMPTY, Room
-from robots.bullet.things import Scene
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
+from robots.rooms import EMPTY, Room
+from robots.things import Scene
 from vrs.clock import Clock, WallClock, seconds_since_1970
 from vrs.errors import UnreachablePoseError, VrsError
 from vrs.model import Array

@@ -24,7 +24,6 @@ from interfaces.teleop.architectures.compositions import CONTROL, POSITIONS, rob
 from interfaces.teleop.autonomy import Autonomy, Hands, LaserSight, NavigatorPilot
 from interfaces.teleop.connection import HostConfig
 from interfaces.teleop.following_base import DrivenConfig, DrivenHost, FollowingBase
-from robots.bullet.rooms import Room
 from robots.mobile.chassis import Senses
 from robots.mobile.robot import MobileRobot
 from robots.onboard.driving import Posture
@@ -32,6 +31,7 @@ from robots.onboard.following import SoundPosition
 from robots.onboard.laser import LaserModel
 from robots.onboard.watchdog import WatchdogConfig
 from robots.robot import Robot
+from robots.rooms import Room
 from vrs.checks import one_of
 from vrs.clock import WallClock
 from vrs.model import Array

@@ -13,7 +13,7 @@ from interfaces.recording.live import TURN, LiveRecorder, LiveRecording
 from interfaces.recording.mcap_file import RecordingError
 from interfaces.runtime.live.devices import OperatorDevice
 from interfaces.teleop.connection import SiteLine
-from robots.bullet.things import Scene
+from robots.things import Scene
 from vrs.clock import Clock, seconds_since_1970
 from vrs.errors import InvalidValueError
 

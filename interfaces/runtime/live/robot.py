@@ -20,8 +20,8 @@ from interfaces.stream.access import Access, bearer
 from interfaces.stream.codec import Value
 from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
-from robots.bullet.things import Scene
 from robots.onboard.watchdog import WatchdogConfig
+from robots.things import Scene
 from vrs.clock import WallClock
 from vrs.model import Array
 

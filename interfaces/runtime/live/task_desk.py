@@ -36,11 +36,11 @@ from interfaces.stream.codec import News
 from interfaces.teleop.operator import HaltCause, OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
 from robots.base import MobileBase
-from robots.bullet.rooms import Room
 from robots.mobile.navigation import outline_of, route_map
 from robots.onboard.driving import Posture
 from robots.onboard.journey import Goal
 from robots.onboard.routes import NoRoute, RouteProblem
+from robots.rooms import Room
 from vrs.errors import FormatError
 
 LARGEST: Final = 24_000

@@ -10,9 +10,9 @@ from interfaces.stream.meshcat.meshes import shaded
 from interfaces.stream.meshcat.newest import ROOT, Nodes
 from interfaces.teleop.predicted_grasp import Hands
 from robots.bullet.grasping import PALM, finger_poses, moving
-from robots.bullet.things import Scene, pose_matrix
 from robots.robot import Gripper
 from robots.solids import Builder, LinkShape
+from robots.things import Scene, pose_matrix
 from vrs.model import Array
 
 STEEL: Final = (0.55, 0.57, 0.60)

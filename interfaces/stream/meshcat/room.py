@@ -16,7 +16,7 @@ from vrs.mobile import Grid
 from vrs.model import Array
 
 if TYPE_CHECKING:
-    from robots.bullet.rooms import Room
+    from robots.rooms import Room
 
 WALL: Final = 0.25
 """Walls are drawn up to here [m]: one looks over them."""

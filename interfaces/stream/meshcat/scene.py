@@ -23,8 +23,8 @@ from vrs.model import Array, RobotModel, frozen_array
 from vrs.timeline import Timeline
 
 if TYPE_CHECKING:
-    from robots.bullet.rooms import Room
-    from robots.bullet.things import Scene
+    from robots.rooms import Room
+    from robots.things import Scene
 
 PATH_PERIOD: Final = 0.1
 """The committed path is renewed, trimmed and the traces are drawn at most this often [s]."""

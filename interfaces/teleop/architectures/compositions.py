@@ -19,7 +19,6 @@ from interfaces.teleop.architectures.controllers import (
 from interfaces.teleop.architectures.sites import DriveController
 from interfaces.teleop.architectures.surroundings import OperatorSurroundings, RobotSurroundings
 from robots.base import MobileBase
-from robots.bullet.rooms import EMPTY, Room
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.navigation import mounts_of, outline_of
 from robots.mobile.position import FusedPosition, LaserPosition, OdometryPosition, TruePosition
@@ -30,6 +29,7 @@ from robots.onboard.following import PositionSource
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.path_following import FieldLaw, PathFollowingConfig
 from robots.onboard.supervisor import EnvironmentSupervisor, SupervisorConfig
+from robots.rooms import EMPTY, Room
 from vrs.checks import number_in, one_of, validated, within
 from vrs.mobile import Avoidance, Grid, VirtualEnvironment
 

@@ -89,7 +89,7 @@ def test_inputs_that_are_none_are_refused_with_the_line(tmp_path: Path, text: st
         operator(f"inputs:{file}", 0, 0.1)
 
 
-@pytest.mark.parametrize("robot", ["bare", "ipr@mujoco"])
+@pytest.mark.parametrize("robot", ["bare", pytest.param("ipr@mujoco", marks=pytest.mark.needs("mujoco"))])
 def test_a_run_is_the_same_to_the_last_bit(robot: str) -> None:
     case = DriveCase("timeline", Transport.DATAGRAMS, "mon@3.3", robot, "slalom", 3, 20.0)
     one, other = run(case), run(case)
@@ -98,6 +98,7 @@ def test_a_run_is_the_same_to_the_last_bit(robot: str) -> None:
     assert one.compare() == other.compare()
 
 
+@pytest.mark.needs("pybullet", "mujoco")
 def test_the_worlds_agree_on_where_a_robot_drives() -> None:
     drives = [
         run(DriveCase("timeline", Transport.DATAGRAMS, "none", robot, "figure-eight", 1, 10.0))

@@ -29,12 +29,13 @@ from interfaces.lab.goals.study import (
     write,
 )
 from interfaces.lab.goals.trial import Trip, TripSetting
-from robots.bullet.rooms import Block, Room
 from robots.ipr.parameters import IPR
 from robots.mobile.navigation import route_map
 from robots.mobile.robot import Collision
 from robots.onboard.journey import Goal, JourneyState
 from robots.onboard.routes import Route, RouteProblem
+from robots.robot import load
+from robots.rooms import Block, Room
 from vrs.errors import InvalidValueError
 
 
@@ -60,7 +61,7 @@ def test_settings_repeat_and_are_what_their_group_says() -> None:
     assert sum(door.share(100.0) == 0.0 for door in closed.doors) == 3
     late = setting(LATE, 3, 1).room
     assert sum(door.share(0.0) < door.share(100.0) for door in late.doors) == 1
-    assert setting(PHYSICS, 3, 0).body == "bullet"
+    assert setting(PHYSICS, 3, 0).body == load("ipr").usual_body
 
 
 @pytest.mark.parametrize("group", [FURNITURE, PHYSICS])

@@ -25,10 +25,10 @@ from interfaces.lab.kim2002.scenario import (
 )
 from interfaces.lab.papers import papers
 from interfaces.messages.jobs import JobStage
-from robots.bullet.rooms import Person
 from robots.ipr.parameters import IPR
 from robots.mobile.body import MobileBody
 from robots.mobile.robot import Collision, place
+from robots.rooms import Person
 from robots.simulated import WORLDS
 from robots.vehicle import Cargo
 from vrs.errors import InvalidValueError

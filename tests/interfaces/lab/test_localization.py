@@ -33,7 +33,6 @@ from interfaces.lab.localization.searching import (
 from interfaces.lab.localization.study import conclude_axes, measure_axis
 from interfaces.lab.localization.trial import CONTROL, body_of, drive, setting, wander
 from interfaces.runs.drive_run import DriveCase
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.apartments import ApartmentConfig, apartment
 from robots.mobile.chassis import MobileReality
 from robots.mobile.floor_plan import FloorPlan, plan_map
@@ -42,6 +41,7 @@ from robots.onboard.global_localization import locate
 from robots.onboard.localization import PaperLocalizer
 from robots.onboard.localizer import Localizer, Status
 from robots.onboard.map_building import MapBuilder, Surveyor
+from robots.rooms import Room, read_room
 from vrs.mobile import wrapped
 
 ROOM = read_room(

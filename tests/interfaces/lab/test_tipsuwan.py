@@ -89,6 +89,7 @@ def test_no_drive_breaks_the_tolerance():
     assert J.max() > 0.2
 
 
+@pytest.mark.needs("pybullet", "mujoco")
 def test_the_ipr_is_driven_in_another_world():
     curve, ends = s_path(0), []
     for body in ("bullet", "mujoco"):

@@ -18,8 +18,8 @@ from interfaces.messages.control import Role
 from interfaces.stream import sockets
 from interfaces.stream.access import Access, hosts
 from interfaces.stream.server import application
-from robots.bullet.rooms import read_room
 from robots.mobile.camera import Lens
+from robots.rooms import read_room
 from vrs.clock import WallClock
 
 ROOM = read_room("room 1\nsize 6 6\nwall 6 0  6 6\nbox 5 3  0.5 3 height=2\n")

@@ -49,6 +49,7 @@ def robot(*words: str) -> Iterator[str]:
         process.stdout.close()
 
 
+@pytest.mark.needs("mujoco")
 def test_cubo_over_sockets_with_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_package(read_model(CUBO), tmp_path / "code")
     monkeypatch.syspath_prepend(str(tmp_path / "code"))

@@ -17,9 +17,9 @@ from interfaces.teleop import Correction, SiteObserver
 from interfaces.teleop.architectures.compositions import operator_surroundings
 from interfaces.teleop.operator import OperatorSite
 from interfaces.teleop.virtual_base import VirtualBase
-from robots.bullet.rooms import EMPTY
 from robots.onboard.driving import STAND, Posture
 from robots.onboard.supervisor import CellChange
+from robots.rooms import EMPTY
 from tests.interfaces.teleop.rig import MODEL, Rig
 from vrs import Engine, ManualClock
 from vrs.ledger import Receipt

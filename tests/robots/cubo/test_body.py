@@ -62,6 +62,7 @@ def test_every_shape_is_closed_and_faces_outwards() -> None:
     assert sum(len(shape.faces) for shape in shapes()) < 20_000
 
 
+@pytest.mark.needs("pybullet")
 def test_what_pybullet_has_is_what_the_parameters_say() -> None:
     with CuboBody(world="bullet") as body:
         assert isinstance(body.vehicle, BulletVehicle)

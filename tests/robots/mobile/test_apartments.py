@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.apartments import ApartmentConfig, apartment, apartment_plan
 from robots.mobile.floor_plan import FloorPlan, Ways, plan_map
 from robots.mobile.robot import PLACES, place
 from robots.onboard.gsp_map import cast_lines
+from robots.rooms import Room, read_room
 from vrs.errors import InvalidValueError
 
 SEEDS = range(8)

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import read_room
 from robots.ipr.parameters import IPR, MICRO
 from robots.mobile.chassis import CameraModel, Chassis, MobileReality, Senses, SonarModel
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import BareBody, MobileRobot
 from robots.mobile.sensing import SonarRing
+from robots.rooms import read_room
 from vrs.errors import InvalidValueError
 from vrs.mobile import advanced
 from vrs.model import Array

@@ -13,7 +13,6 @@ import pytest
 import trimesh
 
 from robots import ipr
-from robots.bullet.rooms import read_room
 from robots.bullet.vehicle import BulletVehicle
 from robots.bullet.world import LostError, WorldClosedError
 from robots.ipr.parameters import IPR, MICRO
@@ -21,6 +20,7 @@ from robots.mobile.body import MobileBody
 from robots.mobile.chassis import CameraModel, Chassis, MobileReality, Senses, SonarModel
 from robots.mobile.robot import BareBody, MobileRobot
 from robots.robot import BARE, load
+from robots.rooms import read_room
 from robots.simulated import WORLDS, Payload
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -152,6 +152,7 @@ def test_masses_and_inertias(chassis: Chassis, total: float) -> None:
     assert part.limits == model.limits
 
 
+@pytest.mark.needs("pybullet")
 @pytest.mark.parametrize("chassis", [IPR, MICRO])
 def test_pybullet_has_what_it_was_given(chassis: Chassis) -> None:
     # It drops inertias silently when a call names damping, too.

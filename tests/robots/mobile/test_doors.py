@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.bullet.rooms import Door, read_room
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import place
+from robots.rooms import Door, read_room
 from robots.simulated import WORLDS
 from tests.robots.mobile.worlds import in_room
 from vrs.errors import FormatError, InvalidValueError

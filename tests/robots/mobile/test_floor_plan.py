@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import Room, read_room
 from robots.mobile.floor_plan import FloorPlan
 from robots.mobile.robot import PLACES, place
+from robots.rooms import Room, read_room
 from robots.simulated import WORLDS
 from tests.robots.mobile.worlds import in_room
 from vrs.model import Array

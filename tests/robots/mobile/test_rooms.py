@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.bullet.rooms import MOST_THINGS, Person, load_room, read_room
 from robots.mobile.robot import PLACES, place
+from robots.rooms import MOST_THINGS, Person, load_room, read_room
 from vrs.errors import FormatError, InvalidValueError
 
 PLAN = """room 1

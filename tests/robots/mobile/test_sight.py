@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
 from robots.base import upright
-from robots.bullet.rooms import EMPTY, read_room
-from robots.bullet.world import SKY, Picture
 from robots.mobile.camera import Lens, Look, Sight, lens_pose
+from robots.mobile.renderer import SKY, Picture
 from robots.robot import HeadCamera, load
+from robots.rooms import EMPTY, read_room
 
 CAMERA = load("ipr").device(HeadCamera)
 assert CAMERA is not None
@@ -29,10 +28,8 @@ AHEAD = Look(0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
-def sight() -> Iterator[Sight]:
-    made = Sight(ROOM, CAMERA, LENS)
-    yield made
-    made.close()
+def sight() -> Sight:
+    return Sight(ROOM, CAMERA, LENS)
 
 
 def where(picture: Picture, kind: str) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -85,10 +82,7 @@ def test_what_comes_and_goes_is_seen_while_it_stands(sight: Sight) -> None:
 def test_a_door_is_in_the_way_until_it_opens() -> None:
     room = read_room("room 1\nsize 6 4\nwall 3 0  3 1.5\nwall 3 2.5  3 4\ndoor 3 1.5  3 2.5 sliding 0,0 2,0 4,1\n")
     sight = Sight(room, CAMERA, LENS)
-    try:
-        shut, half, wide = (sight.draw((1.0, 2.0, 0.0), AHEAD, t)[70:110, 100:140].astype(int) for t in (1, 3, 5))
-    finally:
-        sight.close()
+    shut, half, wide = (sight.draw((1.0, 2.0, 0.0), AHEAD, t)[70:110, 100:140].astype(int) for t in (1, 3, 5))
     # Its leaf is browner than the wall, and beyond it there's nothing but sky and floor.
     brown = [(part[..., 0] - part[..., 2] > 0.2 * part[..., 0]).mean() for part in (shut, half, wide)]
     assert brown[0] == 1.0
@@ -113,10 +107,7 @@ def test_its_own_display_is_in_the_way_far_down(sight: Sight) -> None:
 
 def test_the_floor_of_nowhere_goes_on_and_stays_where_it_is() -> None:
     sight = Sight(EMPTY, CAMERA, LENS)
-    try:
-        at = [sight.draw((x, 0.0, 0.3), Look(0.0, -0.2), 0.0) for x in (0.0, 100.0, 100.25)]
-    finally:
-        sight.close()
+    at = [sight.draw((x, 0.0, 0.3), Look(0.0, -0.2), 0.0) for x in (0.0, 100.0, 100.25)]
     # By a whole number of pairs of tiles the same, by half a tile another.
     assert (at[0] == at[1]).mean() > 0.99
     assert (at[0] != at[2]).any(axis=-1).mean() > 0.02
@@ -125,8 +116,5 @@ def test_the_floor_of_nowhere_goes_on_and_stays_where_it_is() -> None:
 def test_walls_carry_a_ceiling() -> None:
     room = read_room("room 1\nsize 4 4\nwall 0 0  4 0\nwall 4 0  4 4\nwall 4 4  0 4\nwall 0 4  0 0\n")
     sight = Sight(room, CAMERA, LENS)
-    try:
-        picture = sight.draw((2.0, 2.0, 0.0), Look(0.0, 0.7), 0.0)
-    finally:
-        sight.close()
+    picture = sight.draw((2.0, 2.0, 0.0), Look(0.0, 0.7), 0.0)
     assert not (picture == SKY).all(axis=-1).any()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, closing
 
-from robots.bullet.rooms import Room
 from robots.ipr.parameters import MICRO
 from robots.mobile.body import vehicle_of
 from robots.mobile.chassis import MobileReality
+from robots.rooms import Room
 from robots.simulated import WORLDS
 from robots.vehicle import RigidVehicle
 

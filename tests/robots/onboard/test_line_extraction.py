@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import read_room
 from robots.mobile.floor_plan import FloorPlan
 from robots.onboard.laser import LaserScan, beam_angles, deskewed
 from robots.onboard.line_extraction import ExtractionConfig, extract
+from robots.rooms import read_room
 from vrs.model import Array
 
 ROOM = read_room(

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import read_room
 from robots.ipr.parameters import IPR
 from robots.mobile.chassis import MobileReality, Senses
 from robots.mobile.floor_plan import plan_map
@@ -17,6 +16,7 @@ from robots.onboard.laser import LaserModel
 from robots.onboard.line_filter import MotionConfig
 from robots.onboard.localization import LocalizationConfig, Tracker
 from robots.onboard.map_building import Surveyor
+from robots.rooms import read_room
 
 ROOM = read_room(
     "room 1\nsize 6 4\nstart 2 2 0\nwall 0 0  6 0\nwall 6 0  6 4\nwall 6 4  0 4\nwall 0 4  0 0\n"

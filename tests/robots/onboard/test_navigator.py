@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import read_room
 from robots.ipr.parameters import IPR
 from robots.mobile.navigation import BodyNavigator
 from robots.mobile.robot import BareBody
 from robots.onboard.driving import Posture
 from robots.onboard.navigator import Navigator
+from robots.rooms import read_room
 
 ROOM = read_room("room 1\nsize 6 4\nstart 1.2 2 0\nwall 0 0  6 0\nwall 6 0  6 4\nwall 6 4  0 4\nwall 0 4  0 0\n")
 MIDDLE, AT_WALL = Posture(3.0, 2.0, 0.0), Posture(1.0, 2.0, 0.0)

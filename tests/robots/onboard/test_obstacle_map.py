@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from robots.bullet.rooms import Room, read_room
 from robots.ipr.parameters import IPR
 from robots.mobile.chassis import Senses
 from robots.mobile.navigation import route_map
 from robots.mobile.robot import BareBody
 from robots.onboard.laser import LaserModel, OdometryTrack
 from robots.onboard.obstacle_map import ObstacleMap, ObstacleMapConfig
+from robots.rooms import Room, read_room
 from vrs.errors import InvalidValueError
 from vrs.mobile import Grid
 

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from interfaces.lab.goals.scenes import Shortest
-from robots.bullet.rooms import Block, Room
 from robots.ipr.parameters import IPR
 from robots.mobile.navigation import route_config, route_map
 from robots.onboard.path import Arc, Pivot
 from robots.onboard.routes import NoRoute, Route, RouteConfig, RouteMap
+from robots.rooms import Block, Room
 from vrs.errors import InvalidValueError
 
 CONFIG = route_config(IPR.footprint)

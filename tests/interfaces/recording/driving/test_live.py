@@ -21,9 +21,9 @@ from interfaces.recording.live import LiveRecorder, LiveRecording
 from interfaces.recording.playback import Playback
 from interfaces.recording.rerun import rerun
 from interfaces.recording.track import ESTIMATED, MEASURED, REAL_POSTURE, VIRTUAL_POSTURE
-from robots.bullet.rooms import Person, Room
 from robots.mobile.robot import place
 from robots.onboard.journey import Goal
+from robots.rooms import Person, Room
 from tests.interfaces.teleop.rig import CONTROL, TURN, Rig
 from vrs.comparison import match_paths, summed_up
 

@@ -17,7 +17,6 @@ from interfaces.messages.sites import ArchitectureReport
 from interfaces.runs.drive_run import DriveCase, DriveRun
 from interfaces.teleop.architectures import OperatorSurroundings, RobotSurroundings
 from interfaces.teleop.architectures.compositions import echoes_of, grid_of
-from robots.bullet.rooms import EMPTY, Room, read_room
 from robots.ipr.parameters import IPR
 from robots.mobile.chassis import SonarModel
 from robots.mobile.floor_plan import FloorPlan
@@ -27,6 +26,7 @@ from robots.onboard.avoidance import AvoidanceConfig, ObstacleAvoidance, Outline
 from robots.onboard.driving import Drive, Posture
 from robots.onboard.movers import MoversConfig, MoverTracker, Yielding, YieldingConfig
 from robots.onboard.supervisor import CellChange, EnvironmentSupervisor, SupervisorConfig
+from robots.rooms import EMPTY, Room, read_room
 from vrs.mobile import Avoidance, DriveLimits, Grid, VirtualEnvironment, advanced
 
 PEOPLE = int(os.environ.get("VRS_PERSON_SEEDS", "2"))
