@@ -19,7 +19,17 @@ def test_there_is_a_golden_result_for_each_case_and_no_other(past: dict[str, Any
     assert list(past["cases"]) == list(ALL)
 
 
-@pytest.mark.parametrize("name", [case.name for case in COMMANDS])
+SLOW = {"demo trace", "run signals", "run react", "run alter", "run dialogue", "run timed", "run unreachable"} | {
+    "lab recorded",
+    "lab localization",
+}
+"""Seconds each, of ways that others go as well."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(case.name, marks=pytest.mark.slow if case.name in SLOW else ()) for case in COMMANDS],
+)
 def test_a_command_gives_what_it_gave(name: str, unchanged: Callable[[str], None]) -> None:
     unchanged(name)
 

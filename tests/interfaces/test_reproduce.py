@@ -333,6 +333,7 @@ class TestCommand:
             assert captured.err.count("\n") == 1
             assert said in captured.err
 
+    @pytest.mark.slow
     def test_the_same_bytes_in_two_processes(self, tmp_path):
         """Some parts; all of them with VRS_REPRODUCE_PARTS=:, which takes a minute."""
         documents, pictures = [], []
