@@ -17,6 +17,7 @@ from robots.description.arm import arm_model
 from robots.description.assumptions import completed, lines_to_state
 from robots.description.beside import stated_file, stated_of
 from robots.description.description import Description
+from robots.description.hand import DescribedHand, hand_of
 from robots.description.numbers import BaseNumbers, parse_base, read_base, stem
 from robots.description.reading import read
 from robots.description.rigid import carried, rigid_chain
@@ -25,8 +26,8 @@ from robots.mobile import differential
 from robots.onboard.laser import LaserModel
 from robots.robot import NUMBERS, Appearance, Gripper, Robot
 from robots.simulated import WORLDS, chain_arm
-from robots.solids import LinkShape
-from vrs.model import Array
+from robots.solids import LinkShape, together
+from vrs.model import Array, frozen_array
 
 TIP: Final = "#"
 """What stands between a file and the link at the end of the arm."""
@@ -100,7 +101,8 @@ def described(what: str) -> DescribedRobot:
         )
     whole = completed(description, tip)
     model = arm_model(whole, whole.tip)
-    shapes = _arm_shapes(whole)
+    hand = hand_of(whole)
+    shapes = _arm_shapes(whole, hand)
     chain = rigid_chain(whole, whole.tip)
     bodies = {world: partial(chain_arm, world, chain, model.limits, whole.gravity) for world in WORLDS}
     robot = Robot(
@@ -108,11 +110,12 @@ def described(what: str) -> DescribedRobot:
         model,
         Appearance(lambda: shapes, model.links) if shapes else None,
         bodies,
-        () if whole.point is None else (Gripper(whole.point),),
+        _grippers(whole, hand),
         tuple(joint.name for joint in whole.chain(whole.tip) if joint.moves),
         f"{path}{TIP}{tip}" if tip else str(path),
     )
-    return DescribedRobot(robot, whole, whole.notes, tuple(lines_to_state(description, whole)), file)
+    notes = (*whole.notes, *(() if hand is None else hand.notes))
+    return DescribedRobot(robot, whole, notes, tuple(lines_to_state(description, whole)), file)
 
 
 def split(what: str) -> tuple[str, str]:
@@ -142,8 +145,15 @@ def _carried(frames: Array, posture: ArrayLike) -> Array:
     return upright(*np.asarray(posture, dtype=np.float64).tolist()) @ frames
 
 
-def _arm_shapes(description: Description) -> Sequence[LinkShape]:
-    """What an arm looks like: a shape for its base and one for each joint, with all that hangs on it.
+def _grippers(description: Description, hand: DescribedHand | None) -> tuple[Gripper, ...]:
+    """What an arm holds with."""
+    if hand is None:
+        return () if description.point is None else (Gripper(description.point),)
+    return (Gripper(description.point or (0.0, 0.0, 0.0), hand.fingers, frozen_array(hand.X_TH), hand.shapes),)
+
+
+def _arm_shapes(description: Description, hand: DescribedHand | None) -> Sequence[LinkShape]:
+    """What an arm looks like: a shape for its base and one for each joint, with all that hangs on it but fingers.
 
     What has none is drawn as a ball at its joint; nothing at all is drawn where no link has a shape.
     """
@@ -154,25 +164,21 @@ def _arm_shapes(description: Description) -> Sequence[LinkShape]:
     last, X_tip = placed[description.tip]
     to_tip = np.linalg.inv(X_tip)
     groups: list[list[tuple[LinkShape, Array]]] = [[] for _ in range(len(moving) + 1)]
+    fingers = frozenset() if hand is None or not hand.shapes else hand.links
     for name, link in description.links.items():
         owner, X = placed[name]
+        if name in fingers:
+            continue
         groups[owner + 1] += [(shape, to_tip @ X if owner == last else X) for shape in link.shapes]
     return [_together(k, group) for k, group in enumerate(groups)]
 
 
 def _together(k: int, shapes: Sequence[tuple[LinkShape, Array]]) -> LinkShape:
     """Shapes as one, in the frame of what they hang on."""
-    if not shapes:
-        import trimesh
+    if shapes:
+        return together(shapes)
+    import trimesh
 
-        ball = trimesh.creation.icosphere(subdivisions=2, radius=0.01)
-        grey = np.array([0.5, 0.5, 0.5])
-        return LinkShape(f"link {k}", ball.vertices, ball.faces, grey, np.tile(grey, (len(ball.faces), 1)))
-    starts = np.cumsum([0, *(len(shape.vertices) for shape, _ in shapes)])
-    return LinkShape(
-        shapes[0][0].name,
-        np.concatenate([shape.vertices @ X[:3, :3].T + X[:3, 3] for shape, X in shapes]),
-        np.concatenate([shape.faces + start for (shape, _), start in zip(shapes, starts, strict=False)]),
-        shapes[0][0].colour,
-        np.concatenate([shape.face_colours for shape, _ in shapes]),
-    )
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.01)
+    grey = np.array([0.5, 0.5, 0.5])
+    return LinkShape(f"link {k}", ball.vertices, ball.faces, grey, np.tile(grey, (len(ball.faces), 1)))

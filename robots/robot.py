@@ -181,7 +181,7 @@ class Appearance:
 @dataclass(frozen=True, slots=True)
 @validated
 class Fingers:
-    """Two parallel fingers that move together, along x of the last link, and reach out along its z."""
+    """Two parallel fingers that move together, along x of the hand, and reach out along its z."""
 
     stroke: Annotated[float, within(0.001, 1.0, "m")]
     """How far they open [m]."""
@@ -211,14 +211,29 @@ class Fingers:
         return opening
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Gripper:
     """A hand that takes and drops loads."""
 
     point: tuple[float, float, float]
-    """Where it's fastened, in the last link's frame [m]: the point of the tool that is drawn and dragged."""
+    """The point of the tool that is drawn and dragged, in the last link's frame [m]."""
     fingers: Fingers | None = None
     """With which it grasps things; None of a hand that only takes loads."""
+    pose: Array | None = None
+    """Of the hand in the last link's frame, (4, 4): fingers close along x and reach out along z; at `point`, and
+    turned as the link is, unless given."""
+    shapes: tuple[LinkShape, ...] = ()
+    """What both fingers look like, that of positive x first, about their middles; unless given, they and a palm are
+    drawn as boxes."""
+
+    @property
+    def X_LH(self) -> Array:
+        """Pose of the hand in the last link's frame, (4, 4)."""
+        if self.pose is not None:
+            return self.pose
+        X = np.eye(4)
+        X[:3, 3] = self.point
+        return X
 
 
 @dataclass(frozen=True, slots=True)

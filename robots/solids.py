@@ -46,6 +46,18 @@ class LinkShape:
             raise InvalidValueError("face_colours", self.face_colours.shape, f"of shape {faces.shape}")
 
 
+def together(shapes: Sequence[tuple[LinkShape, Array]]) -> LinkShape:
+    """Return shapes, one at least, each at a pose, (4, 4), as one; it's called and coloured as the first."""
+    starts = np.cumsum([0, *(len(shape.vertices) for shape, _ in shapes)])
+    return LinkShape(
+        shapes[0][0].name,
+        np.concatenate([shape.vertices @ X[:3, :3].T + X[:3, 3] for shape, X in shapes]),
+        np.concatenate([shape.faces + start for (shape, _), start in zip(shapes, starts, strict=False)]),
+        shapes[0][0].colour,
+        np.concatenate([shape.face_colours for shape, _ in shapes]),
+    )
+
+
 class Builder:
     """Collects the bodies of one link and joins them."""
 

@@ -13,7 +13,13 @@ EXAMPLES = sorted((HOME / "examples").glob("[0-9]*.py"))
 PROGRAMS = [*sorted((HOME / "examples/val2").glob("*.v2")), *sorted((HOME / "examples/val2/textbook").glob("*.v2"))]
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+NEEDS = {"29_grasp.py": [pytest.mark.needs("pybullet")]}
+"""What examples need beside the usual world of physics."""
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, marks=NEEDS.get(path.name, ())) for path in EXAMPLES], ids=lambda path: path.name
+)
 def test_an_example_runs(path, tmp_path):
     done = subprocess.run(
         [sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False

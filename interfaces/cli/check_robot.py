@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -76,7 +77,12 @@ def _facts(found: DescribedRobot) -> dict[str, Any]:
             "v_max": limits.v_max, "w_max": limits.w_max, "a_max": limits.a_max, "alpha_max": limits.alpha_max,
         }  # fmt: skip
     else:
-        facts |= {"tool_speed": robot.arm.tool_speed, "tool_turn_speed": robot.arm.tool_turn_speed}
+        fingers = None if robot.hand is None else robot.hand.fingers
+        facts |= {
+            "tool_speed": robot.arm.tool_speed,
+            "tool_turn_speed": robot.arm.tool_turn_speed,
+            "fingers": None if fingers is None else asdict(fingers),
+        }
     if description is not None:
         facts |= {
             "tip": None if robot.is_base else description.tip,
@@ -136,6 +142,9 @@ def _show(found: DescribedRobot) -> None:
             assert joint.mimic is not None
             says = f"{joint.mimic.multiplier:g} × {joint.mimic.joint} + {joint.mimic.offset:g}"
             console.print(f"{joint.name} mimics another: {says}")
+        if facts.get("fingers"):
+            opens, force, speed = (facts["fingers"][key] for key in ("stroke", "force", "speed"))
+            console.print(f"fingers: open {1e3 * opens:.3g} mm at {speed:.3g} m/s, press with {force:.3g} N each")
         if description.poses:
             console.print(f"poses: {', '.join(description.poses)}")
     console.print(f"bodies: {', '.join(map(_body, facts['bodies']))}")

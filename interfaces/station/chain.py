@@ -87,8 +87,8 @@ def described(robot: Robot) -> dict[str, Any]:
     home, S = screws(robot.arm)
     gripper, hand = robot.hand, None
     if gripper is not None and gripper.fingers is not None:
-        # The fingers' middles are so far from the middle of the last link, beside half of the opening [m].
-        hand = {"link": len(home) - 1, "x": gripper.point[0], "aside": gripper.fingers.thickness / 2}
+        # The fingers' middles are so far from the middle of the hand, beside half of the opening [m].
+        hand = {"link": len(home) - 1, "aside": gripper.fingers.thickness / 2}
     return {
         "segments": Offer.POLYNOMIALS,
         "home": [X.T.ravel().tolist() for X in home],

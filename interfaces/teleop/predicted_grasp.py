@@ -63,8 +63,7 @@ class PredictedGrasp:
         """
         fingers = self.fingers
         opening = fingers.opening(goals, now)
-        hand = np.array(X)
-        hand[:3, 3] += X[:3, :3] @ self.gripper.point
+        hand = X @ self.gripper.X_LH
         things = moving(self.scene)
         if self._held is not None and self._held[0] < len(things):
             k, place = self._held

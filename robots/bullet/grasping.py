@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -66,19 +67,18 @@ def moving(scene: Scene) -> tuple[Thing, ...]:
     return tuple(thing for thing in scene.things if thing.mass is not None)
 
 
-def finger_poses(gripper: Gripper, X: Array, opening: float) -> Array:
-    """Poses of palm and fingers, (3, 4, 4), at a pose of the last link, (4, 4), and an opening [m]."""
+def finger_poses(gripper: Gripper, opening: float) -> Array:
+    """Poses of palm and fingers in the hand's frame, (3, 4, 4), at an opening [m]."""
     fingers = gripper.fingers
     assert fingers is not None
     aside = 0.5 * (opening + fingers.thickness)
     local = np.tile(np.eye(4), (3, 1, 1))
-    local[:, :3, 3] = gripper.point
-    local[:, :3, 3] += [
+    local[:, :3, 3] = [
         (0.0, 0.0, 0.5 * PALM),
         (aside, 0.0, 0.5 * fingers.length),
         (-aside, 0.0, 0.5 * fingers.length),
     ]
-    return np.asarray(X @ local)
+    return local
 
 
 class GraspWorld(Closing):
@@ -259,8 +259,7 @@ class GraspingArm(Closing):
         """
         assert gripper.fingers is not None
         self._arm, self._model = arm, model
-        self._point = np.eye(4)
-        self._point[:3, 3] = gripper.point
+        self._point = gripper.X_LH
         self._world = GraspWorld(gripper.fingers, scene, self._pose(), dt=dt)
         self._masses = [thing.mass or 0.0 for thing in moving(scene)]
         self._steps = self._looks = 0
@@ -356,11 +355,13 @@ def grasping(make: ArmMaker, robot: Robot, scene: Scene) -> ArmMaker:
 
 
 def fingered(robot: Robot) -> Gripper:
-    """The hand of a robot.
+    """The hand of a robot that is to grasp things.
 
     Raises:
-        InvalidValueError: If it has none with fingers.
+        InvalidValueError: If it has none with fingers, or PyBullet isn't installed.
     """
     if robot.hand is None:
         raise InvalidValueError("scene", robot.name, "of a robot whose gripper has fingers")
+    if find_spec("pybullet") is None:
+        raise InvalidValueError("scene", robot.name, "left out without PyBullet: pip install pybullet")
     return robot.hand

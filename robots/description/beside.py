@@ -123,6 +123,9 @@ def _semantic(description: Description, root: Any, path: Path) -> Description:
         )
         if name not in tips and deepest and all(_above(description, link, deepest) for link in links):
             tips[name] = deepest
+    ends = {hand.get("group", "") for hand in root.findall("end_effector")}
+    groups = [group for group in root.findall("group") if group.get("name", "") in ends]
+    of_hand = tuple(joint.get("name", "") for group in groups for joint in group.findall("joint"))
     for hand in root.findall("end_effector"):
         tips.pop(hand.get("group", ""), None)
         if hand.get("parent_group") and hand.get("parent_link"):
@@ -140,7 +143,7 @@ def _semantic(description: Description, root: Any, path: Path) -> Description:
     known = {name: tip for name, tip in tips.items() if tip in description.links}
     lost = sorted(set(tips) - set(known))
     notes = [f"{path.name}: groups {', '.join(lost)} end at links that aren't there."] if lost else []
-    return replace(description, poses=poses, tips=known, notes=(*description.notes, *notes))
+    return replace(description, poses=poses, tips=known, hand=of_hand, notes=(*description.notes, *notes))
 
 
 def _above(description: Description, link: str, tip: str) -> bool:

@@ -105,6 +105,8 @@ class Description:
     """Named poses: values of joints by their names."""
     tips: Mapping[str, str] = field(default_factory=dict)
     """Named groups that are chains: the tip of each."""
+    hand: tuple[str, ...] = ()
+    """Joints of the end effector, where the SRDF says which; empty where nothing is said."""
     tip: str = ""
     """The link at the end of the arm; empty where nobody has chosen."""
     tool_speed: float | None = None

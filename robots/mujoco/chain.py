@@ -40,15 +40,15 @@ class MujocoChain(Closing):
         body = spec.worldbody
         for link in chain.links:
             body = body.add_body(pos=link.place, quat=w_first(link.turn))
+            # Where the weight lies decides how the body is compiled.
+            body.ipos, body.iquat = link.centre, w_first(quaternion(link.principal()[1]))
             # Its own check refuses inertias that break the triangle inequality, as measured ones do.
             body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
             kind = mujoco.mjtJoint.mjJNT_SLIDE if link.prismatic else mujoco.mjtJoint.mjJNT_HINGE
             body.add_joint(type=kind, axis=link.axis)
         model = spec.compile()
         for j, link in enumerate(chain.links, start=1):
-            diagonal, axes = link.principal()
-            model.body_mass[j], model.body_ipos[j] = link.inertia.mass, link.centre
-            model.body_inertia[j], model.body_iquat[j] = diagonal, w_first(quaternion(axes))
+            model.body_mass[j], model.body_inertia[j] = link.inertia.mass, link.principal()[0]
         data = mujoco.MjData(model)
         mujoco.mj_setConst(model, data)
         self._mujoco, self._model, self._data = mujoco, model, data

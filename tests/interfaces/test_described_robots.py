@@ -53,6 +53,7 @@ def test_a_check_says_what_is_there_what_is_assumed_and_how_it_is_stated(robot: 
     for words in (
         "an arm of 4 joints that ends at palm",
         "grip too mimics another: 1 × grip + 0",
+        "fingers: open ",
         "- upper: mesh my meshes/gone.dae wasn't found",
         "my robot.vrs.toml:",
         '    [joints."shoulder"]\n    acceleration = 8\n    jerk = 80\n',

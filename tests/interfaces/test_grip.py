@@ -27,7 +27,7 @@ from interfaces.teleop.predicted_grasp import PredictedGrasp
 from interfaces.val2.playing import Listeners
 from interfaces.val2.source import parse_file
 from interfaces.val2.twins import play
-from robots.bullet.grasping import HandState, fingered
+from robots.bullet.grasping import HandState
 from robots.robot import exact_arm
 from robots.things import Scene, Thing, read_scene
 from tests.interfaces.own_arm import ROBOT as CRANE
@@ -77,6 +77,7 @@ def run(path: Path, mass: float, **options: object) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.needs("pybullet")
 def test_a_box_is_carried_and_dropped_recorded_and_played_back(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     run(path, 0.5)
@@ -104,11 +105,13 @@ def test_a_box_is_carried_and_dropped_recorded_and_played_back(tmp_path: Path) -
         assert b"\xc3" in shown["/vrs/predicted/0 visible"][1]
 
 
+@pytest.mark.needs("pybullet")
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     first, again = (run(tmp_path / "run.mcap", 0.5, arm=exact_arm) for _ in range(2))
     assert first == again
 
 
+@pytest.mark.needs("pybullet")
 def test_what_is_too_heavy_for_the_grip_stays_where_it_is(tmp_path: Path) -> None:
     # 2 μ F = 48 N bear 4.9 kg.
     run(tmp_path / "run.mcap", 5.5, arm=exact_arm)
@@ -116,6 +119,7 @@ def test_what_is_too_heavy_for_the_grip_stays_where_it_is(tmp_path: Path) -> Non
         assert recording.hands.poses(3.5)[0][2] < TOP + 0.035
 
 
+@pytest.mark.needs("pybullet")
 @pytest.mark.parametrize("there", [True, False])
 def test_a_program_feels_whether_the_hand_closed_on_something(there: bool) -> None:
     scene = read_scene(EXAMPLES / "val2" / "13_grasp.toml")
@@ -216,6 +220,7 @@ def test_fingers_are_told_at_their_ticks_and_newer_orders_count() -> None:
     assert all(news.hand is not None for news in loop.take() if isinstance(news, Measurement))
 
 
+@pytest.mark.needs("pybullet")
 def test_a_process_of_its_own_has_the_hand_and_the_things() -> None:
     thing = Thing("can", (0.4, 0.3, -0.6), cylinder=(0.03, 0.1), mass=0.2)
     clock = WallClock(0.0)
@@ -239,7 +244,8 @@ def test_a_process_of_its_own_has_the_hand_and_the_things() -> None:
 
 
 def test_a_virtual_hand_takes_along_what_it_closes_on() -> None:
-    gripper = fingered(ROBOT)
+    gripper = ROBOT.hand
+    assert gripper is not None
     thing = Thing("box", (0.45, 0.1, 0.0), box=(0.04, 0.05, 0.06), mass=0.2)
     grasp, poses = PredictedGrasp(gripper, Scene(-0.6, (thing,))), {0: thing.pose}
     X = MODEL.forward(down(0.45, 0.1, 0.0))

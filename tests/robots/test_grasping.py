@@ -73,6 +73,7 @@ def slid(mass: float, friction: float, up: float, aside: float = 0.0) -> Array:
         return np.array(found)[-round(HOLD / DT) :]
 
 
+@pytest.mark.needs("pybullet")
 @pytest.mark.parametrize("friction", [0.3, 0.8])
 @pytest.mark.parametrize("acceleration", [0.0, 4.0, 12.0])
 def test_friction_holds_what_twice_mu_F_bears_and_no_more(friction: float, acceleration: float) -> None:
@@ -88,6 +89,7 @@ def test_friction_holds_what_twice_mu_F_bears_and_no_more(friction: float, accel
         assert z[0] - z[-1] > 1e-3
 
 
+@pytest.mark.needs("pybullet")
 def test_what_is_swung_too_fast_slips() -> None:
     # Gravity pulls downwards and the swing aside: friction holds each by itself up to 2 μ F.
     mass, friction = 0.8, 0.5
@@ -96,6 +98,7 @@ def test_what_is_swung_too_fast_slips() -> None:
     assert np.ptp(slid(mass, friction, 0.0, 1.1 * bears)[:, 1]) > 5e-3
 
 
+@pytest.mark.needs("pybullet")
 def test_what_is_held_or_lies_doesnt_creep() -> None:
     held = slid(0.5, 0.6, 0.0)
     assert np.ptp(held, axis=0).max() < 1e-6
@@ -111,6 +114,7 @@ def test_what_is_held_or_lies_doesnt_creep() -> None:
         assert np.abs(np.array(world.poses()) - before).max() < 1e-4
 
 
+@pytest.mark.needs("pybullet")
 def test_things_fall_and_push_each_other_as_mechanics_says() -> None:
     # A fall is ½ g t²; then one box slides into another without friction: together they keep the momentum.
     one, other = (
@@ -135,6 +139,7 @@ def test_things_fall_and_push_each_other_as_mechanics_says() -> None:
         assert v[1, 0] > 0.1
 
 
+@pytest.mark.needs("pybullet")
 def test_a_hand_opens_and_closes_at_its_speed_and_lets_go() -> None:
     with GraspWorld(FINGERS, Scene(0.0, (box(0.3, 0.7),)), hand_at(LOW), dt=DT) as world:
         world.grip(0.08)
@@ -210,6 +215,7 @@ def carried(block: int) -> tuple[Array, list[float | None], Array]:
         return np.concatenate(found), loads, np.array(body.state().poses[0])
 
 
+@pytest.mark.needs("pybullet")
 def test_what_the_arm_carries_weighs_on_it_in_blocks_of_any_length() -> None:
     q, loads, pose = carried(100)
     assert loads == [1.5, None]
@@ -219,6 +225,7 @@ def test_what_the_arm_carries_weighs_on_it_in_blocks_of_any_length() -> None:
     assert loads == loads_again
 
 
+@pytest.mark.needs("pybullet")
 def test_an_ideal_arm_grasps_too_and_one_without_fingers_doesnt() -> None:
     robot = load("puma560")
     with grasping(exact_arm, robot, Scene(-0.6))(robot.arm.poses["nominal"]) as made:
@@ -228,7 +235,7 @@ def test_an_ideal_arm_grasps_too_and_one_without_fingers_doesnt() -> None:
         assert body.state().poses == ()
     with pytest.raises(InvalidValueError, match="gripper has fingers"):
         fingered(load("ipr"))
-    palm, left, right = finger_poses(fingered(robot), np.eye(4), 0.04)
+    palm, left, right = finger_poses(fingered(robot), 0.04)
     assert left[0, 3] - right[0, 3] == pytest.approx(0.04 + 0.012)
     assert palm[2, 3] < left[2, 3]
 

@@ -49,6 +49,20 @@ def states(n: int, count: int) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("sliding", [False, True])
+def test_a_link_at_the_origin_whose_weight_lies_aside_is_a_body_too(world: str, sliding: bool) -> None:
+    # MuJoCo has its own, simpler way with a body in whose origin its weight lies.
+    weight = Inertia(2.0, np.array([0.5, 0.0, 0.0]), np.diag([0.01, 0.2, 0.2]))
+    link = ChainLink(
+        np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), weight, np.eye(4), np.array([0.0, 1.0, 0.0]), sliding
+    )
+    with chain_arm(world, Chain((link,), np.eye(4)), limits(1), 9.81, np.zeros(1)) as arm:
+        mass, bias = arm.bodies.dynamics()
+    expected = (2.0, 0.0) if sliding else (0.2 + 2.0 * 0.25, -2.0 * 9.81 * 0.5)
+    assert (mass[0][0], bias[0]) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("n", [1, 3, 6, 7, 12])
 def test_the_worlds_dynamics_are_those_of_the_chain(world: str, n: int) -> None:
     links = chain(n, n)

@@ -91,7 +91,7 @@ export class StationScene extends window.VrsScene {
   /**
    * Show the real hand and the things as they were.
    * @param {{opening: number, things: Map<number, number[]>} | null} was null leaves them
-   * @param {{link: number, x: number, aside: number} | null} hand where the fingers are
+   * @param {{link: number, aside: number} | null} hand where the fingers are
    */
   grasp(was, hand) {
     if (!was || !hand) return;
@@ -99,7 +99,7 @@ export class StationScene extends window.VrsScene {
       const node = this.viewer.scene_tree.find([ROOT, "real", "body", String(hand.link), "hand", finger]);
       node.object.updateMatrix();
       const matrix = node.object.matrix.toArray();
-      matrix[12] = hand.x + side * (was.opening / 2 + hand.aside);
+      matrix[12] = side * (was.opening / 2 + hand.aside);
       node.set_transform(matrix);
     }
     for (const [k, pose] of was.things) this.viewer.scene_tree.find([ROOT, "things", String(k)]).set_transform(matrixOf(pose));

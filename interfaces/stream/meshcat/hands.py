@@ -21,8 +21,10 @@ STILL: Final = 1e-5
 """What moves by less [m, 1] is left where it is."""
 
 
-def hand_shapes(gripper: Gripper) -> tuple[LinkShape, ...]:
-    """Palm and both fingers, about their middles."""
+def hand_shapes(gripper: Gripper) -> tuple[LinkShape | None, ...]:
+    """Palm and both fingers, about their middles; no palm where that's a part of the last link."""
+    if gripper.shapes:
+        return (None, *gripper.shapes)
     import trimesh
 
     fingers = gripper.fingers
@@ -56,17 +58,21 @@ class DrawnHands:
         self._nodes, self._gripper, self._link, self._objects = nodes, gripper, link, objects
         self._at: dict[str, Array] = {}
         self._scene: Scene | None = None
-        for i, shape in enumerate(hand_shapes(gripper)):
-            mesh = shaded(shape)
-            for twin, draw in (("virtual", objects.ghost), ("real", objects.solid)):
-                path = self._part(twin, i)
-                nodes.put_object(path, draw(path, mesh))
+        for twin, draw in (("virtual", objects.ghost), ("real", objects.solid)):
+            nodes.put_transform(self._hand(twin), gripper.X_LH)
+            for i, shape in enumerate(hand_shapes(gripper)):
+                if shape is not None:
+                    path = self._part(twin, i)
+                    nodes.put_object(path, draw(path, shaded(shape)))
         fingers = gripper.fingers
         assert fingers is not None
         self.show(Hands(fingers.stroke, fingers.stroke))
 
+    def _hand(self, twin: str) -> str:
+        return f"{ROOT}/{twin}/body/{self._link}/hand"
+
     def _part(self, twin: str, i: int) -> str:
-        return f"{ROOT}/{twin}/body/{self._link}/hand/{i}"
+        return f"{self._hand(twin)}/{i}"
 
     def furnish(self, scene: Scene) -> None:
         """Put up the things of a scene, instead of another's."""
@@ -100,8 +106,9 @@ class DrawnHands:
         """Show everything where it is."""
         for twin, opening in (("virtual", hands.virtual), ("real", hands.real)):
             if opening is not None:
-                for i, pose in enumerate(finger_poses(self._gripper, np.eye(4), opening)):
-                    self._place(self._part(twin, i), pose)
+                for i, pose in enumerate(finger_poses(self._gripper, opening)):
+                    if i or not self._gripper.shapes:
+                        self._place(self._part(twin, i), pose)
         count = self._counts().get("things", 0)
         for k, pose in hands.poses.items():
             if k < count:
