@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import ipaddress
 import os
 import secrets
 import signal
@@ -59,6 +60,16 @@ def open_files(wanted: int) -> int:
     if soft < min(wanted, hard):
         resource.setrlimit(kind, (min(wanted, hard), resource.getrlimit(kind)[1]))
     return max(soft, min(wanted, hard))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def read_within(path: Path, most: int) -> bytes:

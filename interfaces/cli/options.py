@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import ipaddress
 import os
 import re
 import signal
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from interfaces.system import on_signal
+from interfaces.system import is_loopback, on_signal
 from robots.robot import FOUND, USUAL, HeadCamera, described, load
 from vrs.errors import FormatError, InvalidValueError
 
@@ -309,16 +308,6 @@ def room_of(text: str) -> Room:
         return load_room(path)
     except OSError as error:
         raise FormatError(path.name, error.strerror or str(error)) from None
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches an address."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
