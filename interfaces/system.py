@@ -105,19 +105,20 @@ def written(where: Path, problem: str = "can't be written") -> Iterator[None]:
         raise FormatError(str(where), f"{problem}: {error.strerror or error}") from None
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, *, mode: int = 0o666) -> None:
     """Write a file, whole or not at all: whoever reads it finds what was there before, or what is there now.
 
     Args:
         path: Where to.
         data: What.
+        mode: Who may do what with it, less what this process takes from everybody (its umask).
 
     Raises:
         OSError: If it can't be written.
     """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        with draft.open("wb") as file:
+        with open(draft, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

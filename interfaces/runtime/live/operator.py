@@ -28,6 +28,7 @@ from interfaces.runtime.live.robot_client import GONE, RobotClient
 from interfaces.runtime.live.task_desk import TaskDesk
 from interfaces.runtime.live.twins import ArmTwins
 from interfaces.stream.access import Access
+from interfaces.stream.certificates import Certificate
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.meshes import bodies
@@ -63,6 +64,8 @@ class LiveOperatorConfig:
     """What is emulated on the way to the robot at first, both ways; clients may change it."""
     robot_token: str | None = field(default=None, repr=False)
     """Token of the role `site` at the robot."""
+    robot_certificate: Certificate | None = None
+    """What is shown to it by TLS; None for nothing."""
     seed: int = 0
     """Seed of the emulated link, ≥ 0."""
     server: str = "vrs"
@@ -120,7 +123,8 @@ class LiveOperator(LeasedRobot, Workers):
         self._turning = Turning(self.clock, self._turn)
         self.robot = RobotClient(
             self.line, config.robot, self.clock, self._turning.soon, name=which.name, room=twins.room,
-            token=config.robot_token, reports=twins.reports, link_loss=config.link_loss,
+            token=config.robot_token, certificate=config.robot_certificate, reports=twins.reports,
+            link_loss=config.link_loss,
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
