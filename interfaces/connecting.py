@@ -22,7 +22,9 @@ def connect(
     """Reach a robot that `vrs serve` serves.
 
     Args:
-        url: `HOST:PORT`, `http://HOST:PORT` or `ws://HOST:PORT/ws`.
+        url: `HOST:PORT`, or an address by http, https, ws or wss; off this machine by TLS only. Behind it stands
+            what the server's certificate is known by: `#sha256=` and the fingerprint that the server has printed,
+            or `#ca=FILE`, authorities of one's own, PEM; else the system's authorities count.
         role: What to do: `viewer`, `operator` or `admin`.
         token: What the role needs; none on a loopback address, but for an admin.
         name: For people, 1 to 100 characters.
@@ -33,7 +35,7 @@ def connect(
 
     Raises:
         UnreachableError: If there's no answer, or the server refuses; it's a ConnectionError.
-        ValueError: If role or encoding is none of those.
+        ValueError: If role, encoding or address is none of those.
     """
     from interfaces.messages.control import Role, Welcome
     from interfaces.stream.client import ClientCore

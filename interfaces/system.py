@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import inspect
+import ipaddress
 import os
 import secrets
 import signal
@@ -61,6 +62,16 @@ def open_files(wanted: int) -> int:
     return max(soft, min(wanted, hard))
 
 
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
 def read_within(path: Path, most: int) -> bytes:
     """The bytes of a file.
 
@@ -94,19 +105,20 @@ def written(where: Path, problem: str = "can't be written") -> Iterator[None]:
         raise FormatError(str(where), f"{problem}: {error.strerror or error}") from None
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, *, mode: int = 0o666) -> None:
     """Write a file, whole or not at all: whoever reads it finds what was there before, or what is there now.
 
     Args:
         path: Where to.
         data: What.
+        mode: Who may do what with it, less what this process takes from everybody (its umask).
 
     Raises:
         OSError: If it can't be written.
     """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        with draft.open("wb") as file:
+        with open(draft, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from datetime import UTC, datetime
 from typing import Protocol
 
 from vrs.checks import finite, not_before
@@ -70,6 +71,11 @@ class WallClock:
 def seconds_since_1970() -> float:
     """The machine's calendar time [s], which may step: for names and files, never for motion."""
     return time.time()
+
+
+def utc(seconds: float) -> datetime:
+    """What the calendar of UTC has, so long after the beginning of 1970 [s]."""
+    return datetime.fromtimestamp(seconds, UTC)
 
 
 def processor_time() -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
 import selectors
 import subprocess
@@ -14,7 +13,16 @@ from typing import IO, TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from interfaces.cli.options import DialectName, RobotName, Tip, dialect_of, option, program_files, val_robot
+from interfaces.cli.options import (
+    DialectName,
+    RobotName,
+    Tip,
+    dialect_of,
+    option,
+    program_files,
+    state_directory,
+    val_robot,
+)
 from interfaces.system import module_process, on_signal, software
 from robots.robot import USUAL
 from vrs.errors import InvalidValueError, VrsError
@@ -37,7 +45,8 @@ _SAYS: Final = re.compile(r"vrs: serving \S+ on (http://\S+)/view\b.*")
 
 def console(
     connect: Annotated[
-        str | None, option("URL", "A server, such as ws://127.0.0.1:8600; without it one is begun.")
+        str | None,
+        option("URL", "A server, 127.0.0.1:8600 or wss://… as vrs serve says it; without it one is begun."),
     ] = None,
     token_file: Annotated[Path | None, option("FILE", "Tokens of that server.")] = None,
     alone: Annotated[bool, option("--alone", "A virtual arm in this process only: no real one, no page.")] = False,
@@ -125,8 +134,7 @@ def _converse(
 async def _typed(monitor: TerminalMonitor, clock: Clock) -> None:
     from interfaces.val2.monitor.terminal import Terminal
 
-    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
-    await Terminal(monitor, clock, history=state / "vrs-teleop" / "console").run()
+    await Terminal(monitor, clock, history=state_directory() / "console").run()
 
 
 async def _piped(monitor: TerminalMonitor, clock: Clock) -> None:

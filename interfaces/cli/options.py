@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
-import ipaddress
 import os
 import re
 import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from interfaces.system import on_signal
+from interfaces.system import is_loopback, on_signal
 from robots.robot import FOUND, USUAL, HeadCamera, described, load
 from vrs.errors import FormatError, InvalidValueError
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
+    from interfaces.stream.audit import AuditLog
+    from interfaces.stream.certificates import Certificate
     from interfaces.val2.values import Dialect
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
@@ -142,6 +144,22 @@ TokenFile: TypeAlias = Annotated[
     Path | None, option("--token-file FILE", "Tokens; needed off loopback. Made if it's missing.")
 ]
 """What lets other machines in: see `access_for`."""
+Audit: TypeAlias = Annotated[
+    Path | None,
+    option("--audit FILE", "Append to it who has control and what is refused; vrs doctor --log checks it."),
+]
+Tls: TypeAlias = Annotated[
+    bool | None,
+    option(
+        "--tls/--no-tls",
+        "TLS, usual off loopback, by a certificate that is made at first. Without it where a proxy speaks it.",
+    ),
+]
+TlsCert: TypeAlias = Annotated[
+    Path | None, option("--tls-cert FILE", "The certificate to show, PEM; with --tls-key.")
+]
+TlsKey: TypeAlias = Annotated[Path | None, option("--tls-key FILE", "Its key, PEM.")]
+"""What is encrypted: see `certificate_for`."""
 ReachedAs: TypeAlias = Annotated[
     list[str] | None,
     option(
@@ -226,7 +244,7 @@ OF_CAMERAS: Final = ("camera",)
 """The same of robots that pictures are made of."""
 OF_SITES: Final = (
     "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead",
-    "friction", "pose", "reports", "reached-as",
+    "friction", "pose", "reports", "reached-as", "audit", "tls", "tls-cert", "tls-key",
 )  # fmt: skip
 """The same of robots that have a site, as thin clients haven't."""
 
@@ -311,16 +329,6 @@ def room_of(text: str) -> Room:
         raise FormatError(path.name, error.strerror or str(error)) from None
 
 
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches an address."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
 def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
     """The tokens of a file, which is made if it's missing; None without one, where only this machine comes in.
 
@@ -377,6 +385,85 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
     return Access(free=free) if tokens is None else Access(tokens, free=())
 
 
+def certificate_for(
+    host: str,
+    token_file: Path | None,
+    also: Iterable[str],
+    *,
+    tls: bool | None,
+    chain: Path | None,
+    key: Path | None,
+) -> Certificate | None:
+    """What a server shows by TLS: one of somebody's own, or one that is made beside its tokens; None without TLS.
+
+    Args:
+        host: Where it listens.
+        token_file: Its tokens; without a file the user's state directory has the certificate.
+        also: Other addresses that it's reached by.
+        tls: Whether TLS is spoken; None: off loopback, and where there's a certificate.
+        chain: A certificate.
+        key: Its key.
+
+    Raises:
+        InvalidValueError: If one of the two files is missing, or they are given without TLS.
+        FormatError: If the certificate can't be used or made.
+    """
+    if tls is None:
+        tls = chain is not None or not is_loopback(host)
+    if (chain is None) != (key is None) or (chain is not None and not tls):
+        raise InvalidValueError("tls-cert", str(chain), "given together with --tls-key, and without --no-tls")
+    if not tls:
+        return None
+    from interfaces.stream.certificates import given_certificate, own_certificate
+
+    if chain is not None and key is not None:
+        return given_certificate(chain, key)
+    others = [found[1].strip("[]") for address in also if (found := _HOST.fullmatch(address))]
+    return own_certificate(_beside(token_file, "tls.pem"), [*names_of(host), *others])
+
+
+def site_certificate(token_file: Path) -> Path:
+    """Where the certificate is that operators' sites show to a robot, as the robot makes it: beside its tokens."""
+    return _beside(token_file, "site.pem")
+
+
+def _beside(token_file: Path | None, name: str) -> Path:
+    return state_directory() / name if token_file is None else token_file.with_name(f"{token_file.name}.{name}")
+
+
+def state_directory() -> Path:
+    """Where what this user's commands keep lies."""
+    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "vrs-teleop"
+
+
+def say_certificate(certificate: Certificate | None) -> None:
+    """Say by what a server is known."""
+    if certificate is not None:
+        new = "made just now: tell its clients, " if certificate.renewed else ""
+        typer.echo(f"vrs: certificate {certificate.chain}, {new}SHA-256 {certificate.shown}")
+
+
+def schemes(certificate: Certificate | None) -> tuple[str, str, str]:
+    """What addresses of pages and of programs begin with, and what those of programs end with."""
+    return ("http", "ws", "") if certificate is None else ("https", "wss", f"#sha256={certificate.fingerprint}")
+
+
+@contextlib.contextmanager
+def audit_log(path: Path | None) -> Iterator[AuditLog | None]:
+    """The audit log of a file meanwhile; None without one.
+
+    Raises:
+        FormatError: If it can't be written, or isn't one.
+    """
+    if path is None:
+        yield None
+        return
+    from interfaces.stream.audit import AuditLog
+
+    with contextlib.closing(AuditLog(path, failed=lambda said: typer.echo(f"vrs: {said}", err=True))) as log:
+        yield log
+
+
 def _is_any(host: str) -> bool:
     """Whether a host stands for all addresses of this machine."""
     return host in {"0.0.0.0", "::"}  # noqa: S104 - compared, not listened on
@@ -406,16 +493,15 @@ def names_of(host: str) -> list[str]:
         found = {str(info[4][0]) for info in socket.getaddrinfo(own, None)}
     except OSError:
         found = set()
-    return sorted({"127.0.0.1", "localhost", "::1", own, *found})
+    return sorted({"127.0.0.1", "localhost", "::1", own, shown_host(host), *found})
 
 
-def asked_for(host: str, also: Iterable[str], *names: str) -> Hosts:
+def asked_for(host: str, also: Iterable[str]) -> Hosts:
     """What the Host of a request may be, by the port that a server listens on.
 
     Args:
         host: Where it listens.
         also: Other addresses that it's reached by, just as a browser's address line has them.
-        *names: Other names of this machine, at that port.
 
     Raises:
         InvalidValueError: If one of those is no address.
@@ -428,7 +514,7 @@ def asked_for(host: str, also: Iterable[str], *names: str) -> Hosts:
     def allowed(port: int) -> frozenset[str]:
         from interfaces.stream.access import hosts
 
-        return hosts([*names_of(host), *names], port).union(others)
+        return hosts(names_of(host), port).union(others)
 
     return allowed
 

@@ -15,13 +15,19 @@ from interfaces.cli.options import (
     ReachedAs,
     RecordedRobot,
     Tip,
+    Tls,
+    TlsCert,
+    TlsKey,
     TokenFile,
     access_for,
     argument,
     asked_for,
+    certificate_for,
     end_on_signal,
     option,
     recorded_robot,
+    say_certificate,
+    schemes,
 )
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -33,6 +39,7 @@ if TYPE_CHECKING:
     from interfaces.recording.playback import Playback
     from interfaces.recording.recording import Recording
     from interfaces.stream.access import Access
+    from interfaces.stream.certificates import Certificate
 
 FEWEST, MOST = 0.1, 1000.0
 """Frames a second."""
@@ -62,6 +69,9 @@ def replay(
     port: Port = 8610,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
 ) -> int:
     """Play recordings back: either way, at any rate, in a loop, live where one is being written.
 
@@ -81,7 +91,8 @@ def replay(
     from interfaces.stream.access import OPEN
 
     robot = recorded_robot(name, tip)
-    access, allowed = access_for(host, token_file, free=OPEN), asked_for(host, reached_as or ())
+    also = reached_as or ()
+    access, allowed = access_for(host, token_file, free=OPEN), asked_for(host, also)
     with ExitStack() as stack:
         paths = [path for path in (run, other) if path is not None]
         recordings = [stack.enter_context(open_recording(path, robot)) for path in paths]
@@ -93,7 +104,8 @@ def replay(
         if headless:
             _print(playback, start, frames, as_json)
         else:
-            _serve(playback, start, access, allowed, host, port)
+            certificate = certificate_for(host, token_file, also, tls=tls, chain=tls_cert, key=tls_key)
+            _serve(playback, start, access, allowed, host, port, certificate)
     return 0
 
 
@@ -179,7 +191,15 @@ def _print(playback: Playback, start: PlaybackStart, frames: float, as_json: boo
     asyncio.run(printed())
 
 
-def _serve(playback: Playback, start: PlaybackStart, access: Access, allowed: Hosts, host: str, port: int) -> None:
+def _serve(
+    playback: Playback,
+    start: PlaybackStart,
+    access: Access,
+    allowed: Hosts,
+    host: str,
+    port: int,
+    certificate: Certificate | None,
+) -> None:
     import asyncio
 
     from interfaces.link.proxy import Address
@@ -205,9 +225,12 @@ def _serve(playback: Playback, start: PlaybackStart, access: Access, allowed: Ho
         )
         number = listening.getsockname()[1]
         app = application(page.routes, allowed(number))
-        async with sockets.serve(app, listening), page.running():
+        context = None if certificate is None else certificate.server_context()
+        scheme, _, _ = schemes(certificate)
+        async with sockets.serve(app, listening, tls=context), page.running():
             names = " and ".join(str(track.recording.path) for track in playback.tracks)
-            typer.echo(f"vrs: playing {names} on http://{Address(host, number)}/replay")
+            typer.echo(f"vrs: playing {names} on {scheme}://{Address(host, number)}/replay")
+            say_certificate(certificate)
             sys.stdout.flush()
             await ended.wait()
 

@@ -6,7 +6,7 @@ import asyncio
 import secrets
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -16,6 +16,7 @@ from interfaces.cli.options import (
     OPERATOR_LOSS,
     ROOM,
     Architecture,
+    Audit,
     BodyName,
     Hosts,
     OperatorLossName,
@@ -24,9 +25,14 @@ from interfaces.cli.options import (
     RoomName,
     SceneFile,
     Tip,
+    Tls,
+    TlsCert,
+    TlsKey,
     TokenFile,
     access_for,
     asked_for,
+    audit_log,
+    certificate_for,
     check_taken,
     end_on_signal,
     end_with_input,
@@ -35,7 +41,10 @@ from interfaces.cli.options import (
     option,
     robot_of,
     room_of,
+    say_certificate,
     saying_policy,
+    schemes,
+    site_certificate,
     tokens_for,
 )
 from interfaces.system import run_loop, software
@@ -54,6 +63,7 @@ if TYPE_CHECKING:
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveBody, LiveRobot
+    from interfaces.stream.certificates import Certificate
     from robots.rooms import Room
 
 
@@ -185,6 +195,10 @@ def robot(
     reports: Annotated[float, option("N", "How often it says where it is [1/s], 1 to 200.")] = 30.0,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    audit: Audit = None,
     until_eof: Annotated[
         bool, option("--until-eof", "End when standard input does, once the robot rests.")
     ] = False,
@@ -213,6 +227,13 @@ def robot(
     watchdog = halting if policy is LossPolicy.HALT else None
     access = access_for(address.host, token_file, free={Role.SITE})
     allowed = asked_for(address.host, reached_as or ())
+    shown = certificate_for(address.host, token_file, reached_as or (), tls=tls, chain=tls_cert, key=tls_key)
+    theirs = None
+    if shown is not None and token_file is not None:
+        from interfaces.stream.certificates import own_certificate
+
+        theirs = own_certificate(site_certificate(token_file), (), client=True)
+    door = _Door(address, allowed, shown, theirs)
     made: LiveBody
     if chosen.is_base:
         from interfaces.jobs import RunnerConfig
@@ -251,9 +272,12 @@ def robot(
 
     async def main() -> str:
         says = f"{made.name}, {kind}", remark
-        return await _serve(LiveRobot(made, access, server=software()), says, address, allowed, until_eof=until_eof)
+        robot = LiveRobot(made, access, server=software(), audit=log)
+        return await _serve(robot, says, door, until_eof=until_eof)
 
-    _end(run_loop(main()))
+    with audit_log(audit) as log:
+        problem = run_loop(main())
+    _end(problem)
 
 
 def _offset(text: str) -> float | None:
@@ -266,9 +290,18 @@ def _offset(text: str) -> float | None:
     return fixed_offset(text, delay_profile("none"))
 
 
-async def _serve(
-    robot: LiveRobot, says: tuple[str, str], address: Address, allowed: Hosts, *, until_eof: bool
-) -> str:
+class _Door(NamedTuple):
+    """Where a robot's site listens, and what both ends show."""
+
+    address: Address
+    allowed: Hosts
+    certificate: Certificate | None
+    """Its own; None without TLS."""
+    theirs: Certificate | None
+    """What operators' sites show; None where anybody's may come."""
+
+
+async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_eof: bool) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
@@ -279,17 +312,23 @@ async def _serve(
 
     end_on_signal(robot.ended)
     robot.met = saying_policy()
+    address, certificate, theirs = door.address, door.certificate, door.theirs
     listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
-    app = application(robot.routes, allowed(port))
+    app = application(robot.routes, door.allowed(port))
     kind, remark = says
-    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
+    context = None if certificate is None else certificate.server_context(None if theirs is None else theirs.chain)
+    async with sockets.serve(app, listening, largest=LARGEST, tls=context), robot.running():
         await robot.ready()
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
             here = Address(address.host, port)
-            typer.echo(f"{READY}ws://{here}/site ({kind})")
+            _, scheme, known = schemes(certificate)
+            typer.echo(f"{READY}{scheme}://{here}/site{known} ({kind})")
+            say_certificate(certificate)
+            if theirs is not None:
+                typer.echo(f"vrs: operators' sites show {theirs.chain}: copy it to them with the token file")
             if remark:
                 typer.echo(f"vrs: {remark}", err=True)
             sys.stdout.flush()

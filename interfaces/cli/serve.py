@@ -18,6 +18,7 @@ from interfaces.cli.options import (
     PROFILES,
     ROOM,
     Architecture,
+    Audit,
     BodyName,
     Host,
     Hosts,
@@ -28,10 +29,15 @@ from interfaces.cli.options import (
     RoomName,
     SceneFile,
     Tip,
+    Tls,
+    TlsCert,
+    TlsKey,
     TokenFile,
     abandon,
     access_for,
     asked_for,
+    audit_log,
+    certificate_for,
     check_taken,
     class_access,
     collect_at_leisure,
@@ -42,9 +48,12 @@ from interfaces.cli.options import (
     option,
     robot_of,
     room_of,
+    say_certificate,
     say_lost,
     say_robot,
+    schemes,
     shown_host,
+    site_certificate,
     speaks_val,
     start_robot,
     untaken,
@@ -63,6 +72,8 @@ if TYPE_CHECKING:
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
+    from interfaces.stream.audit import AuditLog
+    from interfaces.stream.certificates import Certificate
     from interfaces.stream.join import JoinPages
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
@@ -112,11 +123,15 @@ def serve(
     body: BodyName = "",
     scene: SceneFile = None,
     robot_at: Annotated[
-        str | None, option("HOST:PORT", "Where vrs robot listens; without it one is started.")
+        str | None, option("HOST:PORT|URL", "Where vrs robot listens; without it one is started.")
     ] = None,
     robot_token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
+    tls: Tls = None,
+    tls_cert: TlsCert = None,
+    tls_key: TlsKey = None,
+    audit: Audit = None,
     class_: Annotated[
         bool,
         option(
@@ -144,7 +159,6 @@ def serve(
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
     from interfaces.link import Conditions, LinkConditions, delay_profile, loss_model
-    from interfaces.link.proxy import parse_address
     from interfaces.messages.control import Role
     from interfaces.messages.jobs import OperatorLoss
     from interfaces.recording.live import RATE
@@ -152,6 +166,7 @@ def serve(
     from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.live.emulation import late_often, too_slow
     from interfaces.stream.access import OPEN, read_tokens
+    from interfaces.stream.certificates import kept_certificate, peer
     from interfaces.teleop.architectures import architecture as makes
     from robots.bullet.grasping import fingered
     from robots.onboard.watchdog import LossPolicy
@@ -185,10 +200,16 @@ def serve(
         policy, advice = LossPolicy.HOLD, f"--link-loss hold: {slow}"
     else:
         policy, advice = None if robot_at is not None else LossPolicy.HALT, ""
-    at = None if robot_at is None else f"ws://{parse_address('--robot-at', robot_at)}/site"
+    at = None if robot_at is None else _site_url(robot_at)
     own = shown_host(host)
-    allowed = asked_for(host, reached_as or (), *([own] if class_ else ()))
-    token = None if robot_token_file is None else read_tokens(robot_token_file).get(Role.SITE)
+    allowed = asked_for(host, reached_as or ())
+    token, theirs = None, None
+    if robot_token_file is not None:
+        token = read_tokens(robot_token_file).get(Role.SITE)
+        if (copied := site_certificate(robot_token_file)).exists():
+            theirs = kept_certificate(copied)
+    if at is not None:
+        peer(at, theirs)
     check_taken(robots, ctx)
     place = room_of(room)
     if any(robot.is_base for robot in robots):
@@ -225,6 +246,7 @@ def serve(
         read_scene(scene)
         given["scene"] = str(scene)
     access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
+    certificate = certificate_for(host, token_file, reached_as or (), tls=tls, chain=tls_cert, key=tls_key)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
     serving = []
     for k, (robot, named, path) in enumerate(zip(robots, bodies, records, strict=True)):
@@ -240,12 +262,24 @@ def serve(
         eye = camera if robot.device(HeadCamera) else 0.0
         folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
         serving.append(_Serving(
-            robot, link, seed + k, policy, at, token, tuple(options), place, _own(jobs, k, robot), eye,
+            robot, link, seed + k, policy, at, token, theirs, tuple(options), place, _own(jobs, k, robot), eye,
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
             behind, architecture, folder,
         ))  # fmt: skip
     taught = _Class(own, reached_as[0] if reached_as else "", teacher) if class_ else None
-    run_loop(_serve(serving, access, host, port, allowed, taught, until_eof=until_eof))
+    with audit_log(audit) as log:
+        run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, until_eof=until_eof))
+
+
+def _site_url(text: str) -> str:
+    """Where a robot's site is, of `--robot-at`."""
+    from interfaces.link.proxy import parse_address
+    from interfaces.stream.certificates import server_url
+
+    base, hashed, known = text.partition("#")
+    if "://" not in base:
+        base = str(parse_address("--robot-at", base))
+    return server_url(f"{base}{hashed}{known}", "/site")
 
 
 def _own(path: Path, k: int, robot: Robot) -> Path:
@@ -265,6 +299,8 @@ class _Serving:
     robot_at: str | None
     """`ws://HOST:PORT/site`; None: one is started."""
     robot_token: str | None = field(repr=False)
+    robot_certificate: Certificate | None
+    """What is shown to it."""
     options: tuple[str, ...]
     """Of the robot that is started."""
     room: Room
@@ -317,13 +353,13 @@ class _Class:
     teacher: str | None = field(repr=False)
     """The token that was made for the teacher; None where a file has one."""
 
-    def pages(self, access: Access, clock: Clock, port: int) -> JoinPages:
-        """What tells the codes, of a server that listens on a port."""
+    def pages(self, access: Access, clock: Clock, port: int, scheme: str) -> JoinPages:
+        """What tells the codes, of a server that listens on a port by http or https."""
         from interfaces.link.proxy import Address
         from interfaces.stream.join import JoinPages
 
         assert access.invitations is not None
-        base = f"http://{self.reached_as or Address(self.host, port)}/"
+        base = f"{scheme}://{self.reached_as or Address(self.host, port)}/"
         return JoinPages(access.invitations, access, clock, base)
 
 
@@ -348,6 +384,8 @@ async def _serve(
     port: int,
     allowed: Hosts,
     taught: _Class | None,
+    certificate: Certificate | None,
+    log: AuditLog | None,
     *,
     until_eof: bool,
 ) -> None:
@@ -394,7 +432,7 @@ async def _serve(
         from vrs.clock import WallClock
 
         clock = WallClock()
-        operators = [_operator(one, access, clock) for one in serving]
+        operators = [_operator(one, access, clock, log) for one in serving]
         if len(serving) > 1:
             await asyncio.to_thread(share_world, operators)
         first: list[BaseRoute] = []
@@ -424,9 +462,11 @@ async def _serve(
                 others.append(Mount(one.folder, routes=routes))
             else:
                 first = routes
-        joining = None if taught is None else taught.pages(access, clock, shown.port)
+        page, ws, known = schemes(certificate)
+        context = None if certificate is None else certificate.server_context()
+        joining = None if taught is None else taught.pages(access, clock, shown.port, page)
         app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port))
-        for part in (sockets.serve(app, listening), *parts):
+        for part in (sockets.serve(app, listening, tls=context), *parts):
             await stack.enter_async_context(part)
         keep_quiet()
         tidying = asyncio.create_task(
@@ -435,8 +475,9 @@ async def _serve(
         stack.callback(tidying.cancel)
         for one in serving:
             at = f"{shown}{one.folder}"
-            typer.echo(f"vrs: serving {one.robot.name} on http://{at}/view (programs: ws://{at}/ws)")
-            typer.echo(f"vrs: operator station on http://{at}/")
+            typer.echo(f"vrs: serving {one.robot.name} on {page}://{at}/view (programs: {ws}://{at}/ws{known})")
+            typer.echo(f"vrs: operator station on {page}://{at}/")
+        say_certificate(certificate)
         if val_listening is not None:
             val_token = None if access.needs_tokens else make_token()
             val_access = access if val_token is None else Access({Role.OPERATOR: val_token}, free=())
@@ -470,7 +511,7 @@ async def _meet(serving: _Serving, operator: LiveOperator, robot: asyncio.Task[s
     say_robot(operator.robot.url, serving.conditions, serving.link_loss)
 
 
-def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
+def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | None) -> LiveOperator:
     """Make the operator's site."""
     from interfaces.jobs import JobFile
     from interfaces.media import CameraConfig
@@ -479,12 +520,13 @@ def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
 
     record = serving.record
     config = LiveOperatorConfig(
-        serving.robot, "", serving.conditions, serving.robot_token, serving.seed, software(), serving.link_loss,
+        serving.robot, "", serving.conditions, serving.robot_token, serving.robot_certificate, serving.seed,
+        software(), serving.link_loss,
         recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
     )  # fmt: skip
-    return LiveOperator(config, access, clock=clock)
+    return LiveOperator(config, access, clock=clock, audit=log)
 
 
 def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool) -> Station:

@@ -176,17 +176,19 @@ def check_host(given: Sequence[str], allowed: frozenset[str]) -> bool:
     return len(given) == 1 and given[0].lower() in allowed
 
 
-def check_origin(given: Sequence[str], allowed: frozenset[str]) -> bool:
+def check_origin(given: Sequence[str], allowed: frozenset[str], *, tls: bool = False) -> bool:
     """Whether a request comes from a page of this server, or from no browser at all.
 
     Args:
         given: The values of its Origin headers: none from a program that isn't a browser.
-        allowed: From `hosts`; pages are served by http, or by https in front of it.
+        allowed: From `hosts`.
+        tls: Whether pages are served by https; else they are by http, or by a proxy's https in front of it.
     """
     if not given:
         return True
+    schemes = {"https"} if tls else {"http", "https"}
     scheme, separator, host = given[0].partition("://")
-    return len(given) == 1 and bool(separator) and scheme in {"http", "https"} and host.lower() in allowed
+    return len(given) == 1 and bool(separator) and scheme in schemes and host.lower() in allowed
 
 
 def bearer(authorization: str) -> str | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from interfaces.clients.ports import RemotePort
 from interfaces.engine_server.site import earliest
 from interfaces.messages.control import Problem, ProtocolError
+from interfaces.stream.certificates import Certificate, explained, peer
 from interfaces.stream.client import FROM_SERVER, ClientCore, Phase
 from interfaces.stream.codec import Encoding
 from vrs.clock import Clock
@@ -60,7 +61,7 @@ class Line:
         """Connect, and wait until the server has said welcome.
 
         Args:
-            url: Of the server's WebSocket, `ws://HOST:PORT/ws`.
+            url: Of the server's WebSocket, from `server_url`.
             core: The client.
             clock: Local time.
             loop: Where it runs, in a thread of its own.
@@ -151,7 +152,7 @@ class Line:
                 pause = FIRST_PAUSE
             except (OSError, WebSocketException, ProtocolError, TimeoutError) as error:
                 refused = isinstance(error, ConnectionRefusedError)
-                reason = "no server listens there" if refused else str(error) or type(error).__name__
+                reason = "no server listens there" if refused else explained(error, tls=self.url.startswith("wss"))
             with self.changed:
                 self.failure = reason
                 self.core.disconnected()
@@ -225,21 +226,35 @@ class Line:
         return iter(self.parts)
 
 
-def dial(url: str, encoding: Encoding, *, largest: int, opening: float, closing: float) -> connect:
+def dial(
+    url: str,
+    encoding: Encoding,
+    *,
+    largest: int,
+    opening: float,
+    closing: float,
+    certificate: Certificate | None = None,
+) -> connect:
     """A connection to enter: not compressed, not by a proxy, and without WebSocket's own pings.
 
     Args:
-        url: `ws://HOST:PORT/…`.
+        url: From `server_url`.
         encoding: What the server is asked for.
         largest: Longest message that is received [B].
         opening: Longest that it may take to be made [s].
         closing: Longest that a farewell may take [s].
+        certificate: What this end shows where it's asked for one.
+
+    Raises:
+        InvalidValueError, FormatError: As `peer`.
     """
     from websockets.asyncio.client import connect
     from websockets.typing import Subprotocol
 
+    server = peer(url, certificate)
     return connect(
-        url,
+        server.url,
+        ssl=server.context,
         subprotocols=[Subprotocol(encoding.value)],
         compression=None,
         max_size=largest,

@@ -35,6 +35,7 @@ from interfaces.messages.control import (
 )
 from interfaces.messages.fields import Epoch
 from interfaces.messages.jobs import Doing, Forecast, JobList, ListCommand, RobotTask, TaskOrder, Tasks
+from interfaces.stream.certificates import peer, server_url
 from interfaces.stream.client import Ask, ClientCore, Phase, Replied
 from interfaces.stream.client_socket import Line, UnreachableError
 from interfaces.stream.codec import Welcomed
@@ -68,8 +69,10 @@ class Connection:
 
         Raises:
             UnreachableError: If there's no answer, or the server refuses.
+            InvalidValueError, FormatError: If the address is none, or plain off this machine; see `peer`.
         """
-        self._url, self._client, self._timeout = _address(url), client, timeout
+        self._url, self._client, self._timeout = server_url(url), client, timeout
+        peer(self._url)
         self._clock = WallClock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="vrs-client", daemon=True)
@@ -392,11 +395,3 @@ class Connection:
 
 def _expected(kind: type[A], answer: Replied) -> A | Problem:
     return answer if isinstance(answer, (kind, Problem)) else ELSE
-
-
-def _address(url: str) -> str:
-    scheme, separator, rest = url.partition("://")
-    if not separator:
-        scheme, rest = "ws", url
-    scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
-    return f"{scheme}://{rest}" if "/" in rest else f"{scheme}://{rest}/ws"

@@ -334,7 +334,8 @@ def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp
             given = [(name.lower(), value.decode("latin-1")) for name, value in scope["headers"]]
             host = [value for name, value in given if name == b"host"]
             origin = [value for name, value in given if name == b"origin"]
-            if not (check_host(host, allowed) and check_origin(origin, allowed)):
+            tls = scope.get("scheme") in {"https", "wss"}
+            if not (check_host(host, allowed) and check_origin(origin, allowed, tls=tls)):
                 await _refuse(scope, receive, send)
                 return
         await app(scope, receive, send)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import ssl
 from asyncio.transports import BaseTransport, Transport
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -69,6 +70,8 @@ class SocketLimits:
     strangers: Annotated[int, within(1, 100_000)] = 512
     """Most unauthenticated connections, 1 to 100,000; the oldest gives way to a new one. They never take more than
     a quarter of the files that may be open."""
+    handshake: Annotated[float, within(0.01, 60, "s")] = 5.0
+    """Time for the handshake of TLS [s], 0.01 to 60."""
     request: Annotated[float, within(0.01, 60, "s")] = 5.0
     """Time for a request's header, from the connection's beginning or the answer before [s], 0.01 to 60."""
     body: Annotated[float, within(0.01, 60, "s")] = 5.0
@@ -116,7 +119,9 @@ class ConnectionState(ServerState):
         super().__init__()
         self.limits = limits
         self.turns = Turns()
-        self.strangers: Strangers[_Bounded] = Strangers(max(1, min(limits.strangers, open_files(FILES) // 4)))
+        self.strangers: Strangers[_Bounded | _Handshake] = Strangers(
+            max(1, min(limits.strangers, open_files(FILES) // 4))
+        )
 
 
 class _Bounded(asyncio.Protocol):
@@ -143,7 +148,7 @@ class _Bounded(asyncio.Protocol):
         address = "" if self.client is None else self.client[0]
         oldest = self._state.strangers.add(self, address, until=self._phase_until)
         if oldest is not None:
-            oldest.transport.abort()
+            oldest.abort()
 
     def _begin_phase(self, seconds: float = float("inf")) -> None:
         """Begin a phase that may take so long [s]."""
@@ -170,6 +175,22 @@ class _Bounded(asyncio.Protocol):
         """Let it go."""
         super().connection_lost(exc)
         self._state.strangers.discard(self)
+
+    def abort(self) -> None:
+        """Cut the connection off; what waits to be sent is dropped."""
+        self.transport.abort()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Handshake:
+    """A connection that is at the handshake of TLS: a stranger, as any. HTTP follows."""
+
+    connection: socket.socket
+
+    def abort(self) -> None:
+        """Cut the connection off: the handshake finds its end, and whoever has the socket then closes it."""
+        with contextlib.suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
 
 
 class BoundedHttp(_Bounded, H11Protocol):
@@ -380,10 +401,6 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
             head = bytes((first, 127)) + size.to_bytes(8, "big")
         self.transport.write(head + data)
 
-    def abort(self) -> None:
-        """Cut the connection off; what waits to be sent is dropped."""
-        self.transport.abort()
-
     def waiting(self) -> int:
         """Bytes that wait in this process to be sent."""
         return self.transport.get_write_buffer_size()
@@ -438,6 +455,7 @@ async def serve(
     *,
     largest: int = LARGEST_MESSAGE,
     limits: SocketLimits | None = None,
+    tls: ssl.SSLContext | None = None,
 ) -> AsyncIterator[None]:
     """Serve an ASGI application on a socket, which is closed in the end, with all its connections.
 
@@ -446,6 +464,7 @@ async def serve(
         listening: From `bind`.
         largest: Largest message that is received [bytes].
         limits: Of connections.
+        tls: What TLS is spoken by, from `Certificate.server_context`; None: nothing is encrypted.
     """
     config = uvicorn.Config(
         app,  # type: ignore[arg-type]
@@ -466,11 +485,14 @@ async def serve(
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
     looking = asyncio.create_task(_cut_off_overdue(state))
-    task = asyncio.create_task(server.serve(sockets=[listening]))
+    task = asyncio.create_task(server.serve(sockets=[listening] if tls is None else []))
     try:
         while not server.started and not task.done():
             await asyncio.sleep(0.002)
-        yield
+        async with contextlib.AsyncExitStack() as doors:
+            if tls is not None:
+                await doors.enter_async_context(_tls_door(listening, tls, server, state))
+            yield
     finally:
         looking.cancel()
         server.should_exit = True
@@ -480,6 +502,58 @@ async def serve(
         _abort_all(connections)
 
 
+@contextlib.asynccontextmanager
+async def _tls_door(
+    listening: socket.socket, tls: ssl.SSLContext, server: uvicorn.Server, state: ConnectionState
+) -> AsyncIterator[None]:
+    """Take connections that speak TLS, and give them to the server when they have shaken hands."""
+    loop = asyncio.get_running_loop()
+    handshakes: dict[asyncio.Task[None], _Handshake] = {}
+
+    def http() -> BoundedHttp:
+        return BoundedHttp(server.config, state, server.lifespan.state, loop)
+
+    async def shake_hands(connection: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            await loop.connect_accepted_socket(
+                http,
+                connection,
+                ssl=tls,
+                ssl_handshake_timeout=state.limits.handshake,
+                ssl_shutdown_timeout=FAREWELL,
+            )
+
+    def done(task: asyncio.Task[None]) -> None:
+        state.strangers.discard(handshakes.pop(task))
+
+    async def accept() -> None:
+        while True:
+            try:
+                connection, address = await loop.sock_accept(listening)
+            except OSError:
+                # It has gone again, or there are too many files.
+                await asyncio.sleep(_LOOK)
+                continue
+            task = asyncio.create_task(shake_hands(connection))
+            handshake = handshakes[task] = _Handshake(connection)
+            task.add_done_callback(done)
+            oldest = state.strangers.add(handshake, str(address[0]), until=loop.time() + state.limits.handshake)
+            if oldest is not None:
+                oldest.abort()
+            # A handshake takes as long as ten requests: they begin one in each round of the loop.
+            await asyncio.sleep(0)
+
+    accepting = asyncio.create_task(accept())
+    try:
+        yield
+    finally:
+        accepting.cancel()
+        for handshake in handshakes.values():
+            handshake.abort()
+        await asyncio.wait([accepting, *handshakes])
+        listening.close()
+
+
 async def _cut_off_overdue(state: ConnectionState) -> None:
     clock = asyncio.get_running_loop().time
     while True:
@@ -487,7 +561,7 @@ async def _cut_off_overdue(state: ConnectionState) -> None:
         while overdue := state.strangers.overdue(clock())[:CUT_OFF]:
             for connection in overdue:
                 state.strangers.discard(connection)
-                connection.transport.abort()
+                connection.abort()
             # A thousand may be overdue at once: others have their turn in between.
             await asyncio.sleep(0)
 

@@ -15,6 +15,7 @@ import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
+from ssl import SSLContext
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ from interfaces.runtime.physics import PhysicsConfig
 from interfaces.runtime.physics_messages import Grips
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.audit import AuditLog
+from interfaces.stream.certificates import Certificate
 from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
 from robots import load
@@ -74,27 +77,36 @@ class Rows:
 
 @contextlib.asynccontextmanager
 async def robot_here(
-    *, site: RobotSiteConfig | None = None, body: str = IDEAL, port: int = 0
+    *,
+    site: RobotSiteConfig | None = None,
+    body: str = IDEAL,
+    port: int = 0,
+    tls: SSLContext | None = None,
+    audit: AuditLog | None = None,
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
     made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
-    robot = LiveRobot(made, Access(free={Role.SITE}))
+    robot = LiveRobot(made, Access(free={Role.SITE}), audit=audit)
     app = application(robot.routes, hosts(["127.0.0.1"], port))
-    async with sockets.serve(app, listening, largest=LARGEST), robot.running():
+    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running():
         await robot.ready()
-        yield robot, f"ws://127.0.0.1:{port}/site"
+        yield robot, f"{'ws' if tls is None else 'wss'}://127.0.0.1:{port}/site"
 
 
 @contextlib.asynccontextmanager
-async def operator_here(url: str, *, delay: str = "none") -> AsyncIterator[tuple[LiveOperator, str]]:
+async def operator_here(
+    url: str, *, delay: str = "none", certificate: Certificate | None = None
+) -> AsyncIterator[tuple[LiveOperator, str]]:
     """An operator's site in this loop, and its URL for programs."""
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(LiveOperatorConfig(ROBOT, url, link, q=NOMINAL), Access(free=OPEN))
+    operator = LiveOperator(
+        LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate), Access(free=OPEN)
+    )
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"

@@ -15,6 +15,7 @@ from websockets.exceptions import WebSocketException
 
 from interfaces.messages.control import PROTOCOL, Attached, Hello, Ping, Problem, ProtocolError, Role
 from interfaces.messages.sites import Report
+from interfaces.stream.certificates import Certificate, explained
 from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.teleop.connection import SiteLine
@@ -68,6 +69,7 @@ class RobotClient:
         name: str,
         room: str = "",
         token: str | None = None,
+        certificate: Certificate | None = None,
         reports: type = Report,
         link_loss: LossPolicy | None = None,
     ) -> None:
@@ -75,18 +77,20 @@ class RobotClient:
 
         Args:
             line: What speaks and listens.
-            url: `ws://HOST:PORT/site`; empty while that isn't known yet, see `url`.
+            url: From `server_url`, as `ws://HOST:PORT/site`; empty while that isn't known yet, see `url`.
             clock: Session time.
             changed: Called when something has come, or the connection has.
             name: Of the robot's model; another isn't let in.
             room: Of a mobile robot: name of the room that it's to drive in.
             token: Of the role `site`.
+            certificate: What this site shows to one that asks for it.
             reports: What its robots send.
             link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
         """
         self._coming: Any = reports | Ping | Problem
         self._name, self._room, self._link_loss = name, room, link_loss
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
+        self._certificate = certificate
         self._session = secrets.token_urlsafe(12)
         self._waiting: deque[Value] = deque(maxlen=_WAITING)
         self._wake = asyncio.Event()
@@ -151,7 +155,7 @@ class RobotClient:
                 RobotRefusedError,
                 RobotUnfitError,
             ) as error:
-                self.problem = str(error) or type(error).__name__
+                self.problem = explained(error, tls=self.url.startswith("wss"))
             except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
                 _LOG.exception("the connection to the robot failed")
                 self.problem = f"this site failed at a message of the robot's: {type(error).__name__}"
@@ -162,7 +166,15 @@ class RobotClient:
             await asyncio.sleep(AGAIN)
 
     async def _once(self) -> None:
-        async with dial(self.url, Encoding.MSGPACK, largest=LARGEST, opening=OPENING, closing=0.5) as socket:
+        line = dial(
+            self.url,
+            Encoding.MSGPACK,
+            largest=LARGEST,
+            opening=OPENING,
+            closing=0.5,
+            certificate=self._certificate,
+        )
+        async with line as socket:
             hello = Hello(PROTOCOL, Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss)
             await socket.send(encode(hello, Encoding.MSGPACK))
             async with asyncio.timeout(OPENING):

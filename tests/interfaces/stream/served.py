@@ -41,7 +41,7 @@ class Robot:
 
 
 def make_hub(
-    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, **options
+    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, audit=None, **options
 ) -> Hub:
     site = Site(Engine(MODEL, q=HOME, clock=ManualClock(now)))
     robot = Robot(stops)
@@ -54,6 +54,7 @@ def make_hub(
         robot,
         config=HubConfig(instance="one", server="test", **options),
         emulation=emulation,
+        audit=audit,
         random_bytes=lambda n: next(counter).to_bytes(n, "big"),
     )
     robot.hub = hub
@@ -70,12 +71,12 @@ class ServingHub(Serving):
 
 
 @contextlib.asynccontextmanager
-async def _serving(sockets=None, **options):
-    clock, listening = WallClock(0.0), bind()
+async def _serving(sockets=None, tls=None, port=0, **options):
+    clock, listening = WallClock(0.0), bind(port=port)
     server = HubServer(make_hub(now=clock.now(), **options), clock)
     serving = ServingHub(listening.getsockname()[1], server)
     app = application(server.routes, hosts(["127.0.0.1", "localhost"], serving.port))
-    async with serve(app, listening, limits=sockets), server.running():
+    async with serve(app, listening, limits=sockets, tls=tls), server.running():
         yield serving
 
 
