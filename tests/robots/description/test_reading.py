@@ -26,11 +26,18 @@ from vrs.errors import FormatError, InvalidValueError
 from vrs.model import Array
 
 
+@pytest.mark.needs("mujoco")
 def test_the_table_of_robots_that_were_tried_is_what_they_give() -> None:
     assert tried.page() == tried.PAGE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", tried.ROBOTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.needs("mujoco")] if "mjcf" in file else ())
+        for name, (_, file) in tried.ROBOTS.items()
+    ],
+)
 def test_robots_of_pybullet_and_the_toolbox_are_read_whole(name: str) -> None:
     found = tried.examined(name)
     whole = found.description
