@@ -529,7 +529,7 @@ class TwistCourse(NamedTuple):
     """The joints along the twist, as functions of the way s [s at full speed]."""
 
     path: Array
-    """Joint positions: ascending powers of s, (k + 1, n)."""
+    """Joint positions, from where it begins: ascending powers of s, (k + 1, n), the first 0."""
     A: Array
     """Largest rate of the share there that the acceleration limits leave [1/s], (k,)."""
     J: Array
@@ -594,7 +594,7 @@ def course(
                 break
     # On the way as a share of it, and then as it is.
     path = np.empty((len(_DEGREES), len(q)))
-    path[0], path[1] = q, seen * rates[0]
+    path[0], path[1] = 0.0, seen * rates[0]
     path[2:] = _THROUGH @ (on_way[1:] - _NODES[1:, None] * path[1])
     derivatives = np.abs(np.array((rates, (_BENDS @ path[2:]) / seen**2, (_TWISTS @ path[3:]) / seen**3)))
     path *= (1.0 / seen) ** _DEGREES[:, None]
@@ -609,7 +609,7 @@ def course(
         caps[-1] = 0.0 if seen < reach else caps[-1]
     places = q + on_way
     if (places < limits.q_min).any() or (places > limits.q_max).any():
-        on = polynomial(path, grid)
+        on = q + polynomial(path, grid)
         out = (on < np.minimum(q, limits.q_min) - _NEAR_LIMIT) | (on > np.maximum(q, limits.q_max) + _NEAR_LIMIT)
         if out.any():
             caps = caps * (np.arange(len(grid)) < out.any(axis=1).argmax() - 1)
@@ -708,18 +708,14 @@ _STOP = 0.95
 """How long after the hold the arm may still move [s]: each joint by itself stops in about half of that."""
 
 
-def displacement(dv: Array, da: Array, T: float) -> Array:
-    """How far an arm goes while a rate and an acceleration die away in T with the least squared jerk, (n,)."""
-    return np.asarray(T * (dv / 2.0 + T * da / 12.0))
-
-
-def transient(away: Array, dv: Array, da: Array, T: float) -> Array:
-    """Bring an offset, its rate and its acceleration to nothing in T.
+def transient(dv: Array, da: Array, T: float) -> Array:
+    """Bring a rate and an acceleration to nothing in T, with the least squared jerk.
 
     Returns:
-        Ascending powers of the time, (6, n).
+        Where that leads: ascending powers of the time, (5, n), the first 0.
     """
-    return (_START * T**_BY_TIME) @ np.array((away, dv, da))
+    end = dv / T
+    return np.array((np.zeros_like(dv), dv, 0.5 * da, -(end + da / 1.5) / T, (0.5 * end + 0.25 * da) / (T * T)))
 
 
 _BY_TIME = np.arange(3.0) - np.arange(6.0)[:, None]
@@ -870,8 +866,8 @@ def along(
     onto_u = onto_u / float(onto_u @ u)
     s = float(state.qd @ onto_u)
     dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
-    still = np.zeros_like(u)
-    aside = displacement(dv, still, shortest(dv, still, limits, _BUDGETS[0][1]))
+    # Half of the way at that rate is where a transient leads.
+    aside = 0.5 * shortest(dv, np.zeros_like(u), limits, _BUDGETS[0][1]) * dv
     way = course(model, state.q + aside, u, twist, hold + _AHEAD, limits, held)
     u, slope = way.path[1], 2.0 * way.path[2]
     bent = state.qdd - s * s * slope
@@ -891,7 +887,7 @@ def along(
             T = shortest(dv, da, limits, for_transient)
         if max(T, float(law.starts[-1])) > hold + _STOP:
             break
-        plan = _composed(state, way, law, transient(-aside, dv, da, T), T)
+        plan = _composed(state, way, law, transient(dv, da, T), T)
         if violation(plan, limits, jerk=True) is None:
             return plan, share
     return None, share
@@ -901,15 +897,14 @@ def _composed(state: State, way: TwistCourse, law: SpeedLaw, beside: Array, T: f
     """The course under the law, and beside it a transient of duration T that meets the state."""
     t = _knots([*law.starts.tolist(), T])
     x, v, a = law.at(t)
+    # Positions from where the arm is, as the others would lose digits.
     q, u, bend = _derivatives(way.path, x)
     left, rate, change_here = _derivatives(beside, np.minimum(t, T))
     v, a = v[:, None], a[:, None]
     at = np.array((q + left, v * u + rate, a * u + v * v * bend + change_here))
-    at[:, 0] = state.q, state.qd, state.qdd
+    at[1:, 0] = state.qd, state.qdd
     at[1:, -1] = 0.0
     h = t[1:] - t[:-1]
-    # Positions from where the arm is, as the others would lose digits.
-    at[0] -= state.q
     ends = np.concatenate([at[:, :-1], at[:, 1:]]).swapaxes(0, 1)
     c = (_BETWEEN * h[:, None, None] ** _BETWEEN_POWERS) @ ends
     c[:, 0] += state.q
