@@ -30,7 +30,7 @@ from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.online import roots
 from vrs.planning.parabolic import brake
-from vrs.planning.path import polynomial, rotations
+from vrs.planning.path import polynomial
 from vrs.planning.plan import Plan, empty, packed
 from vrs.planning.redundancy import TASK, stiffness, units
 from vrs.segment import State
@@ -330,7 +330,7 @@ STOP_AT = 100.0
 """Condition number at which approaching ends, and above which rates are damped."""
 _WEIGHTED = 10.0
 """By how much weights may make a condition number larger."""
-_NODES = np.array([0.0, 0.06, 0.25, 0.5, 0.78, 1.0])
+_NODES = np.array([0.0, 0.04, 0.14, 0.3, 0.5, 0.7, 0.87, 1.0])
 """Where the way is looked at; the nearest, which is what is moved before the next input, the closest."""
 _DEGREES = np.arange(len(_NODES) + 1.0)
 """Of a polynomial of which the values there, and the slope at 0, are known."""
@@ -370,47 +370,36 @@ class Twist(NamedTuple):
 
     def after(self, s: Array) -> Array:
         """The twist at each of the times s [s] of motion at full speed, (k, 6)."""
-        v, w = self.linear, self.angular
-        rate = float(np.sqrt(w @ w))
-        if not self.turns or rate == 0.0:
-            return np.broadcast_to(np.concatenate([v, w]), (len(s), 6))
-        axis = w / rate
-        along = (axis @ v) * axis
-        c, d = np.cos(rate * s)[:, None], np.sin(rate * s)[:, None]
-        turned = along + c * (v - along) + d * _cross(axis, v)
-        return np.concatenate([turned, np.broadcast_to(w, (len(s), 3))], axis=1)
+        twists = np.empty((len(s), TASK))
+        twists[:, :3] = self._turned(s)[0] @ self.linear if self.turns else self.linear
+        twists[:, 3:] = self.angular
+        return twists
 
-    def missed(self, X: Array, s: Array, length: float) -> Array:
-        """What poses lack of where the twist leads from the first of them, as twists, (k, 6).
+    def leads(self, X: Array, s: Array) -> tuple[Array, Array]:
+        """Where it leads from a pose X, (4, 4), at each of the times s.
 
-        Args:
-            X: Poses of the tool, (k + 1, 4, 4).
-            s: Times of motion at full speed [s], (k + 1,), the first 0.
-            length: The characteristic length [m].
+        Returns:
+            Ways of the tool over the characteristic length, (k, 3), and its rotation matrices, (k, 3, 3).
         """
-        v, w = self.linear, self.angular
-        rate = float(np.sqrt(w @ w))
-        way = s[1:, None] * v
-        R = X[0, :3, :3]
-        if rate:
-            R = rotations(s[1:, None] * w) @ R
-            if self.turns:
-                axis, angle = w / rate, rate * s[1:, None]
-                along = (axis @ v) * axis
-                across = np.sin(angle) * (v - along) + (1.0 - np.cos(angle)) * _cross(axis, v)
-                way = s[1:, None] * along + across / rate
-        M = R @ X[1:, :3, :3].swapaxes(1, 2)
-        missed = np.empty((len(way), TASK))
-        missed[:, :3] = way - (X[1:, :3, 3] - X[0, :3, 3]) / length
-        missed[:, 3] = 0.5 * (M[:, 2, 1] - M[:, 1, 2])
-        missed[:, 4] = 0.5 * (M[:, 0, 2] - M[:, 2, 0])
-        missed[:, 5] = 0.5 * (M[:, 1, 0] - M[:, 0, 1])
-        return missed
+        turned, led = self._turned(s)
+        return led @ self.linear if self.turns else s[:, None] * self.linear, turned @ X[:3, :3]
+
+    def _turned(self, s: Array) -> tuple[Array, Array]:
+        """Rotations since the start at times s, (k, 3, 3), and their integrals over the time [s]."""
+        x, y, z = w = self.angular.tolist()
+        rate = hypot(*w) or 1.0
+        K = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) / rate
+        angle = (rate * s)[:, None, None]
+        sine, rest = np.sin(angle), 1.0 - np.cos(angle)
+        return _EYE + sine * K + rest * (K @ K), (angle * _EYE + rest * K + (angle - sine) * (K @ K)) / rate
 
 
-def _cross(a: Array, b: Array) -> Array:
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+_EYE = np.eye(3)
+
+
+def _axial(M: Array) -> Array:
+    """Σ a × b for M = Σ a bᵀ, (..., 3, 3): (..., 3)."""
+    return np.asarray(M[..., (1, 2, 0), (2, 0, 1)] - M[..., (2, 0, 1), (1, 2, 0)])
 
 
 def weighted_jacobian(model: RobotModel, q: Array) -> Array:
@@ -511,6 +500,27 @@ def inverses(model: RobotModel, q: Array, J: Array, held: NDArray[np.bool_] | No
     return ease[:, :, None] * damped_inverses(eased, _WEIGHTED * STOP_AT)[0], _nearness(J)
 
 
+def bend_along(J: Array, P: Array, u: Array, twist: Twist) -> Array:
+    """How joint rates change on the way along a twist [rad/s²], at its start, (n,).
+
+    Of a redundant arm, and where rates are damped, nearly.
+
+    Args:
+        J: The Jacobian there, (6, n).
+        P: What makes rates of twists, (n, 6).
+        u: Rates [rad/s], (n,).
+        twist: What is followed.
+    """
+    # Joints turn the axes of those behind them, and what these carry.
+    turns = J[3:] * u
+    until = np.add.accumulate(turns, axis=1)
+    before = until - turns
+    change_here = np.concatenate([_axial((until + before) @ (J[:3] * u).T), _axial(before @ turns.T)])
+    if twist.turns:
+        change_here[:3] -= np.cross(twist.angular, twist.linear)
+    return np.asarray(-P @ change_here)
+
+
 def _rates(P: Array, twists: Array) -> Array:
     """Rates of twists (k, 6) by inverses (k, n, 6): (k, n)."""
     return np.asarray((P @ twists[:, :, None])[:, :, 0])
@@ -550,6 +560,7 @@ def course(
     model: RobotModel,
     q: Array,
     u: Array,
+    bend: Array,
     twist: Twist,
     reach: float,
     limits: Limits,
@@ -561,37 +572,20 @@ def course(
         model: The arm.
         q: Where it begins [rad], (n,).
         u: Rates there, nearly [rad/s], (n,).
+        bend: How they change, nearly [rad/s²], (n,).
         twist: What to follow.
         reach: How far to look [s at full speed].
         limits: Their speeds and positions bound the share.
         held: Joints of a redundant arm that stay where they are, (n,); none unless given.
     """
-    seen, few = reach, len(q) < TASK
+    seen = reach
     while True:
         ways = seen * _NODES
-        twists = twist.after(ways)
-        places = q + ways[:, None] * u
-        P, near = inverses(model, places, weighted_jacobian(model, places), held)
-        change_here = _change(P, near)
-        if change_here <= _CHANGE or seen <= _SHORTEST:
-            places = q + seen * (_LED @ _rates(P, twists))
-            J = weighted_jacobian(model, places)
-            P, near = inverses(model, places, J, held)
-            change_here = _change(P, near)
-            if change_here <= _CHANGE or seen <= _SHORTEST:
-                break
+        on_way, rates, near, share = _followed(model, q, u, bend, twist, ways, held)
+        if share == 1.0 or seen <= _SHORTEST:
+            break
         # Rates near a singularity change like 1 / σ_min: no polynomial fits them over a longer way.
-        seen = max(min(0.9 * _CHANGE / change_here, 0.8) * seen, _SHORTEST)
-    rates = _rates(P, twists)
-    on_way = seen * (_LED @ rates)
-    if _followed(J, rates, twists) if few else float(np.abs(near).min()) > 1.0 / STOP_AT:
-        for _ in range(_CORRECTIONS):
-            missed = twist.missed(model.forward(q + on_way), ways, model.characteristic_length)
-            if few:
-                missed[:, 3:] = 0.0
-            on_way[1:] += _rates(P[1:], missed)
-            if float(np.abs(missed).max()) < _NEARLY:
-                break
+        seen = max(0.9 * share * seen, _SHORTEST)
     # On the way as a share of it, and then as it is.
     path = np.empty((len(_DEGREES), len(q)))
     path[0], path[1] = 0.0, seen * rates[0]
@@ -618,8 +612,50 @@ def course(
     return TwistCourse(path, np.interp(grid, ways, A), np.interp(grid, ways, J), grid, caps)
 
 
-def _followed(J: Array, rates: Array, twists: Array) -> bool:
-    """Whether rates, (k, n), give the linear part of twists, (k, 6)."""
+def _followed(
+    model: RobotModel,
+    q: Array,
+    u: Array,
+    bend: Array,
+    twist: Twist,
+    ways: Array,
+    held: NDArray[np.bool_] | None,
+) -> tuple[Array, Array, Array, float]:
+    """Find the joints at some ways along a twist, by Newton's method; inverses serve again where they're near.
+
+    Returns:
+        Joints from where the way begins, (k, n); rates there, (k, n); σ_min / σ_max there, (k,); the share of the
+        way that's even. Where that's less than 1, the joints are of no use.
+    """
+    few = len(q) < TASK
+    twists = twist.after(ways)
+    on_way = ways[:, None] * (u + 0.5 * ways[:, None] * bend)
+    goal, missed, off = None, twists, np.inf
+    for _ in range(_CORRECTIONS):
+        if off > _COARSE:
+            looked_at = on_way
+            J = weighted_jacobian(model, q + on_way)
+            P, near = inverses(model, q + on_way, J, held)
+            rates, share = _rates(P, twists), _even(P, near)
+            if share < 1.0 and float(ways[-1]) > _SHORTEST:
+                break
+        on_way = on_way + _rates(P, missed) if goal else float(ways[-1]) * (_LED @ rates)
+        if (goal and off * float(np.abs(on_way - looked_at).max()) < _NEARLY) or not _exact(J, near, rates, twists):
+            break
+        X = model.forward(q + on_way)
+        goal = goal or twist.leads(X[0], ways)
+        missed = np.zeros_like(twists)
+        missed[:, :3] = goal[0] - (X[:, :3, 3] - X[0, :3, 3]) / model.characteristic_length
+        if not few:
+            missed[:, 3:] = 0.5 * _axial(X[:, :3, :3] @ goal[1].swapaxes(1, 2))
+        off = float(np.abs(missed).max())
+    return on_way, rates, near, share
+
+
+def _exact(J: Array, near: Array, rates: Array, twists: Array) -> bool:
+    """Whether rates, (k, n), by J, (k, 6, n), give twists, (k, 6); of fewer than six joints, their linear part."""
+    if J.shape[2] >= TASK:
+        return float(np.abs(near).min()) > 1.0 / STOP_AT
     return float(np.abs((J[:, :3] @ rates[:, :, None])[:, :, 0] - twists[:, :3]).max()) < _FOLLOWED
 
 
@@ -645,18 +681,23 @@ def _bounds(derivatives: Array, limits: Limits) -> tuple[Array, Array, Array]:
     return shares, 1.0 / np.maximum(rate / (1.0 - s * s * bent), 6.0 * s * bent_jerk), 0.7 / jerk
 
 
-def _change(P: Array, near: Array) -> float:
-    """By which part σ_min / σ_max changes from the first place on; if not of six joints, the inverses too.
+def _even(P: Array, near: Array) -> float:
+    """On which share of the way σ_min / σ_max changes little; if not of six joints, the inverses too.
 
     Args:
         P: Inverses, (k, n, 6).
         near: σ_min / σ_max, (k,).
     """
     n = P.shape[1]
-    moved = 0.0 if n == TASK else 0.5 * float(np.abs(P[1:] - P[0]).max()) / float(np.abs(P[0]).max())
-    if n < TASK:
-        return moved
-    return max(moved, float(np.abs(near[1:] - near[0]).max()) / max(abs(float(near[0])), 1.0 / STOP_AT))
+    changes = np.abs(near - near[0]) / max(abs(float(near[0])), 1.0 / STOP_AT)
+    if n != TASK:
+        moved = 0.5 * np.abs(P - P[0]).max(axis=(1, 2)) / float(np.abs(P[0]).max())
+        changes = moved if n < TASK else np.maximum(changes, moved)
+    first = int((changes > _CHANGE).argmax())
+    if first == 0:
+        return 1.0
+    (low, high), (start, end) = changes[first - 1 : first + 1].tolist(), _NODES[first - 1 : first + 1].tolist()
+    return float(start + (end - start) * (_CHANGE - low) / (high - low))
 
 
 def _share(near: Array, way: Array, rate: float) -> Array:
@@ -680,8 +721,9 @@ def _share(near: Array, way: Array, rate: float) -> Array:
     return np.asarray(share)
 
 
-_CORRECTIONS, _NEARLY = 3, 3e-5
-"""How often the places on the way are corrected at most, and what they miss [rad] before the last time."""
+_CORRECTIONS, _COARSE, _NEARLY = 4, 1e-3, 3e-6
+"""How often the places on the way are looked for at most; from what they miss on [rad] other inverses are needed;
+and what they may miss in the end."""
 _CHANGE = 0.5
 """By which part σ_min / σ_max may change on a way that polynomials fit."""
 _BENT, _JERKED = 0.4, 0.4
@@ -718,14 +760,11 @@ def transient(dv: Array, da: Array, T: float) -> Array:
     return np.array((np.zeros_like(dv), dv, 0.5 * da, -(end + da / 1.5) / T, (0.5 * end + 0.25 * da) / (T * T)))
 
 
-_BY_TIME = np.arange(3.0) - np.arange(6.0)[:, None]
 _START = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 0.5], [-10, -6, -1.5], [15, 8, 1.5], [-6, -3, -0.5]])
 _END = np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]])
 _BETWEEN = np.concatenate([_START, _END], axis=1)
 """Coefficients of the polynomial of the fifth degree on [0, 1] with given position, rate, acceleration at its start
 and its end."""
-_BETWEEN_POWERS = np.concatenate([_BY_TIME, _BY_TIME], axis=1)
-"""Of the duration, where that isn't 1."""
 
 
 def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
@@ -806,22 +845,19 @@ def speed_law(
         The law, and the share that may be had at the start.
     """
     allowed = reachable(way, part)
-    steps = 1 if allowed.min() >= goal else 5
+    As, Js = (part * way.A).tolist(), (part * way.J).tolist()
+    gap, last = float(way.grid[1]), len(As) - 1
+    capped = float(allowed[: int(max(s, goal) * hold / gap) + 2].min()) < goal
+    steps = 5 if capped else 1
     starts, states = [], []
     x, v, a, t = 0.0, s, ds, 0.0
-    parts: list[tuple[float, float]] = [(goal, hold)] if steps == 1 else [(-1.0, hold / steps)] * steps
-    A, J = part * float(way.A.min()), part * float(way.J.min())
-    for target, lasting in [*parts, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
-        u = target
-        if steps > 1:
-            # What holds from here to where the step, or the stop, ends.
-            A, J = part * float(np.interp(x, way.grid, way.A)), part * float(np.interp(x, way.grid, way.J))
-            far = x + v * min(lasting, abs(v) / A + A / J)
-            if target < 0.0:
-                u = min(goal, *np.interp([x, far], way.grid, allowed).tolist())
-            passed = (way.grid > x) & (way.grid < far + way.grid[1])
-            A = min([A, *(part * way.A[passed]).tolist()])
-            J = min([J, *(part * way.J[passed]).tolist()])
+    for target, lasting in [*[(goal, hold / steps)] * steps, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
+        # What holds from here to where the step, or the stop, ends.
+        here, fastest = min(max(int(x / gap), 0), last), abs(v) if capped else max(abs(v), target)
+        far = x + fastest * min(lasting, fastest / As[here] + As[here] / Js[here])
+        passed = slice(here, max(int(far / gap), here) + 2)
+        A, J = min(As[passed]), min(Js[passed])
+        u = min(target, *np.interp([x, far], way.grid, allowed).tolist()) if capped else target
         phases: JerkProfile = change(v, a, u, A, J)
         for h, j, after in cut(phases, a, lasting) if lasting < np.inf else phases:
             starts.append(t)
@@ -839,6 +875,7 @@ def along(
     state: State,
     model: RobotModel,
     u: Array,
+    bend: Array,
     twist: Twist,
     goal: float,
     hold: float,
@@ -851,6 +888,7 @@ def along(
         state: Start.
         model: The arm.
         u: Joint rates of the twist at the start [rad/s], (n,).
+        bend: How they change on the way [rad/s²], (n,).
         twist: What to follow.
         goal: Share of its speed to reach.
         hold: When the stop begins [s].
@@ -858,8 +896,8 @@ def along(
         held: Joints of a redundant arm that stay where they are, (n,); none unless given.
 
     Returns:
-        A certified plan, or None where none of the budgets gives one; and the share of the speed that may be
-        had at the start.
+        A certified plan, or a stop on the way, or None where none of the budgets gives one; and the share of the
+        speed that may be had at the start.
     """
     # A joint counts by its share of the speed limits.
     onto_u = u / (limits.qd_max * limits.qd_max)
@@ -868,7 +906,7 @@ def along(
     dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
     # Half of the way at that rate is where a transient leads.
     aside = 0.5 * shortest(dv, np.zeros_like(u), limits, _BUDGETS[0][1]) * dv
-    way = course(model, state.q + aside, u, twist, hold + _AHEAD, limits, held)
+    way = course(model, state.q + aside, u, bend, twist, hold + _AHEAD, limits, held)
     u, slope = way.path[1], 2.0 * way.path[2]
     bent = state.qdd - s * s * slope
     ds = float(bent @ onto_u)
@@ -877,19 +915,18 @@ def along(
         # Near enough to leave the rest to the transient, without knots of its own.
         s, ds = target, 0.0
     dv, da = state.qd - s * u, bent - ds * u
-    T = shortest(dv, da, limits, _BUDGETS[0][1])
-    for for_law, for_transient, part in _BUDGETS:
-        law, share = speed_law(s, ds, goal, part * hold, way, for_law)
-        if float(law.state[0, -1]) > float(way.grid[-1]):
-            way = way.ending()
-            law, share = speed_law(s, ds, goal, part * hold, way, for_law)
-        if for_transient != _BUDGETS[0][1]:
+    for to in dict.fromkeys((goal, 0.0)):
+        for for_law, for_transient, part in _BUDGETS:
+            law, share = speed_law(s, ds, to, part * hold, way, for_law)
+            if float(law.state[0, -1]) > float(way.grid[-1]):
+                way = way.ending()
+                law, share = speed_law(s, ds, to, part * hold, way, for_law)
             T = shortest(dv, da, limits, for_transient)
-        if max(T, float(law.starts[-1])) > hold + _STOP:
-            break
-        plan = _composed(state, way, law, transient(dv, da, T), T)
-        if violation(plan, limits, jerk=True) is None:
-            return plan, share
+            if max(T, float(law.starts[-1])) > hold + _STOP:
+                break
+            plan = _composed(state, way, law, transient(dv, da, T), T)
+            if violation(plan, limits, jerk=True) is None:
+                return plan, share
     return None, share
 
 
@@ -905,8 +942,10 @@ def _composed(state: State, way: TwistCourse, law: SpeedLaw, beside: Array, T: f
     at[1:, 0] = state.qd, state.qdd
     at[1:, -1] = 0.0
     h = t[1:] - t[:-1]
-    ends = np.concatenate([at[:, :-1], at[:, 1:]]).swapaxes(0, 1)
-    c = (_BETWEEN * h[:, None, None] ** _BETWEEN_POWERS) @ ends
+    powers = h[:, None] ** _DEGREES[:6]
+    scale = powers[:, :3].T[:, :, None]
+    c = _BETWEEN @ np.concatenate([at[:, :-1] * scale, at[:, 1:] * scale]).swapaxes(0, 1)
+    c /= powers[:, :, None]
     c[:, 0] += state.q
     return Plan(h, c)
 
@@ -1012,22 +1051,23 @@ def _by_twist(
     q = state.q[None]
     J = weighted_jacobian(model, q)
     asked = np.concatenate([twist.linear, twist.angular])
-    u = inverses(model, q, J)[0][0] @ asked
+    P, _ = inverses(model, q, J)
+    u = P[0] @ asked
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
         stuck = hold > 0.0 and bool(asked.any())
-        return *_released(state, J[0], hold, model, limits), _stuck(state.q, model) if stuck else ""
+        return *_released(state, J[0], P[0], hold, model, limits), _stuck(state.q, model) if stuck else ""
     hindrance = _at_limit(state.q, u, limits, model)
     held = None
     if hindrance and len(u) > TASK:
-        held, u = _without_limits(model, state.q, u, J, asked, limits)
+        held, P = _without_limits(model, state.q, u, J, P, limits)
+        u = P[0] @ asked
         hindrance = hindrance if held is None else ""
-    plan, share = along(state, model, u, twist, 1.0, hold, limits, held)
+    bend = bend_along(J[0], P[0], u, twist)
+    plan, share = along(state, model, u, bend, twist, 1.0, hold, limits, held)
     missed = asked - J[0] @ u
     slowed = share < _SLOWED or float(missed @ missed) > (1.0 - _SLOWED) ** 2 * float(asked @ asked)
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
         hindrance = _singular(state.q, model)
-    if plan is None:
-        plan, _ = along(state, model, u, twist, 0.0, hold, limits, held)
     if plan is not None:
         return plan, (), hindrance
     low, high = rates_to_limits(state.q, limits)
@@ -1036,18 +1076,18 @@ def _by_twist(
 
 
 def _without_limits(
-    model: RobotModel, q: Array, u: Array, J: Array, asked: Array, limits: Limits
+    model: RobotModel, q: Array, u: Array, J: Array, P: Array, limits: Limits
 ) -> tuple[NDArray[np.bool_] | None, Array]:
-    """Which joints of a redundant arm stay at their limits while the others do what is asked, and those rates.
+    """Which joints of a redundant arm stay at their limits while the others do what is asked, and their inverses.
 
-    None, and the rates as they were, where the others can't.
+    None, and the inverses as they were, where the others can't.
     """
     low, high = rates_to_limits(q, limits)
     held = (_SLOWED * u < low) | (_SLOWED * u > high)
-    P, near = inverses(model, q[None], J * ~held, held)
+    of_others, near = inverses(model, q[None], J * ~held, held)
     if held.sum() > len(u) - TASK or near[0] < 1.0 / SLOW_FROM:
-        return None, u
-    return held, P[0] @ asked
+        return None, P
+    return held, of_others
 
 
 def _at_limit(q: Array, u: Array, limits: Limits, model: RobotModel) -> str:
@@ -1092,12 +1132,15 @@ def _singular(q: Array, model: RobotModel) -> str:
     return f"near a singularity: jog joint {joint + 1}{way}, or move back"
 
 
-def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, Notes]:
+def _released(
+    state: State, J: Array, P: Array, hold: float, model: RobotModel, limits: Limits
+) -> tuple[Plan, Notes]:
     """Stop on the way that the tool is going."""
     u = state.qd
     if float((np.abs(u) / limits.qd_max).max()) >= STANDING:
         present = J @ u
-        plan, _ = along(state, model, u, Twist(present[:3], present[3:], False), 0.0, hold, limits)
+        twist = Twist(present[:3], present[3:], False)
+        plan, _ = along(state, model, u, bend_along(J, P, u, twist), twist, 0.0, hold, limits)
         if plan is not None:
             return plan, ()
     return _by_rates(state, np.zeros_like(u), hold, limits)
