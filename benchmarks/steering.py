@@ -98,7 +98,7 @@ def accuracy(dt: float, end: float, count: int) -> None:
         twist[:3] *= 0.25 / np.linalg.norm(twist[:3])
         timeline = Timeline(q)
         for k in range(round(max(end - 0.15, dt) / dt)):
-            timeline, _, _ = give(timeline, k * dt, None, twist, "base")
+            timeline, _, _ = give(timeline, k * dt, None, twist, Frame.BASE)
         places = timeline.sample(np.linspace(0, end, 50))
         if (places > LIMITS.q_max - 0.3).any() or (places < LIMITS.q_min + 0.3).any():
             continue
@@ -126,9 +126,9 @@ def main() -> None:
         MODEL.jacobian(q)
         costs.append(time.perf_counter() - start)
     print(f"one Jacobian: {microseconds(costs)}")
-    session("rates", "base", SESSION)
-    session("twist", "base", SESSION)
-    session("twist", "tool", min(SESSION, 120.0))
+    session("rates", Frame.BASE, SESSION)
+    session("twist", Frame.BASE, SESSION)
+    session("twist", Frame.TOOL, min(SESSION, 120.0))
     for dt, end in ((0.2, 0.35), (0.2, 1.0), (0.02, 1.0), (0.005, 1.0)):
         accuracy(dt, end, 60)
 

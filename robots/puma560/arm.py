@@ -56,23 +56,31 @@ from vrs.checks import finite, finite_array
 from vrs.errors import InvalidValueError, UnreachablePoseError
 from vrs.model import Array, Limits, frozen_array
 
-# Rounded: the twists are right angles, whose cosine is 0 and not 6e-17.
-_COS_ALPHA: Final = frozen_array([round(math.cos(alpha)) for alpha in DH_ALPHA])
-_SIN_ALPHA: Final = frozen_array([round(math.sin(alpha)) for alpha in DH_ALPHA])
-_A: Final = frozen_array(DH_A)
-_D: Final = frozen_array(DH_D)
+# What the cosine and the sine of a joint are multiplied by in the pose of its link, and what's beside that, each
+# (6, 4, 4). Rounded: the twists are right angles, whose cosine is 0 and not 6e-17.
+_BY_COSINE, _BY_SINE, _FIXED = (
+    frozen_array(rows)
+    for rows in zip(
+        *(
+            (
+                ((1, 0, 0, a), (0, c, -s, 0), (0, 0, 0, 0), (0, 0, 0, 0)),
+                ((0, -c, s, 0), (1, 0, 0, a), (0, 0, 0, 0), (0, 0, 0, 0)),
+                ((0, 0, 0, 0), (0, 0, 0, 0), (0, s, c, d), (0, 0, 0, 1)),
+            )
+            for a, c, s, d in zip(
+                DH_A, map(round, map(math.cos, DH_ALPHA)), map(round, map(math.sin, DH_ALPHA)), DH_D, strict=True
+            )
+        ),
+        strict=True,
+    )
+)
 
 
 def link_poses(q: Array) -> Array:
     """Return the poses of base and links in the base frame, (k, 7, 4, 4), for q of shape (k, 6) [rad]."""
-    c, s = np.cos(q), np.sin(q)
-    steps = np.zeros((*q.shape, 4, 4))
-    steps[..., 0, 0], steps[..., 1, 0] = c, s
-    steps[..., 0, 1], steps[..., 1, 1] = -s * _COS_ALPHA, c * _COS_ALPHA
-    steps[..., 0, 2], steps[..., 1, 2] = s * _SIN_ALPHA, -c * _SIN_ALPHA
-    steps[..., 2, 1], steps[..., 2, 2] = _SIN_ALPHA, _COS_ALPHA
-    steps[..., 0, 3], steps[..., 1, 3] = _A * c, _A * s
-    steps[..., 2, 3], steps[..., 3, 3] = _D, 1.0
+    steps = np.cos(q)[..., None, None] * _BY_COSINE
+    steps += np.sin(q)[..., None, None] * _BY_SINE
+    steps += _FIXED
     poses = np.empty((len(q), DOF + 1, 4, 4))
     poses[:, 0] = np.eye(4)
     for i in range(DOF):

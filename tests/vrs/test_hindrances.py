@@ -60,7 +60,8 @@ def test_a_hand_is_told_of_a_singularity_and_of_a_way_out_that_leads_out(pose, t
     rates = np.zeros(6)
     rates[int(found[1]) - 1] = -0.3 if found[2] == " down" else 0.3
     assert hand.push(1.0, rates=rates) == ""
-    assert hand.nearness() > 2.0 * before
+    # Beside READY there are two singularities at once; no joint leads out of both.
+    assert hand.nearness() > (1.0 if pose == "ready" else 2.0) * before
     assert hand.push(0.3, twist=np.zeros(6)) == "", "who lets go needs no word"
 
 

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from robots import puma560
 from vrs.commands import Frame
@@ -17,10 +18,10 @@ from vrs.planning.parabolic import brake
 from vrs.planning.plan import Plan, end_state
 from vrs.planning.steering import (
     change,
-    damped_rates,
+    damped_inverses,
+    inverses,
     one_joint,
     run,
-    sliding_rates,
     steer,
     weighted_jacobian,
 )
@@ -66,30 +67,28 @@ def check_laws(timeline: Timeline, *, noted: int = 0) -> None:
     """Limits and jumps from the segments alone, by roots, apart from the engine's certificate."""
     before = None
     jumps = 0
+    bounds = (
+        (LIMITS.q_min, LIMITS.q_max), *((-most, most) for most in (LIMITS.qd_max, LIMITS.qdd_max, LIMITS.qddd_max))
+    )  # fmt: skip
     for segment in timeline.segments:
-        a, h = np.zeros((4, 6)), segment.duration
-        a[: len(segment.coefficients)] = segment.coefficients
-        inside = {0.0, h}
-        for column in a.T:
-            slopes = (column[1], 2.0 * column[2], 3.0 * column[3])
-            roots = np.roots(slopes[::-1]) if any(slopes[1:]) else []
-            inside |= {float(r.real) for r in roots if abs(r.imag) < 1e-9 and 0 < r.real < h}
-            if column[3]:
-                inside |= {t for t in (-column[2] / (3.0 * column[3]),) if 0 < t < h}
-        u = np.array(sorted(inside))[:, None]
-        q = a[0] + u * (a[1] + u * (a[2] + u * a[3]))
-        qd = a[1] + u * (2.0 * a[2] + u * 3.0 * a[3])
-        qdd = 2.0 * a[2] + u * 6.0 * a[3]
-        assert (q <= LIMITS.q_max + 1e-9).all()
-        assert (q >= LIMITS.q_min - 1e-9).all()
-        assert (np.abs(qd) <= LIMITS.qd_max * (1 + 1e-9)).all()
-        assert (np.abs(qdd) <= LIMITS.qdd_max * (1 + 1e-9)).all()
-        assert (np.abs(6.0 * a[3]) <= LIMITS.qddd_max * (1 + 1e-9)).all()
+        h, ends = segment.duration, []
+        a = segment.coefficients
+        for order, (low, high) in enumerate(bounds):
+            a = a if order == 0 else a[1:] * np.arange(1.0, len(a))[:, None] if len(a) > 1 else np.zeros((1, 6))
+            slack = 1e-9 * (1.0 if order == 0 else high)
+            for j, column in enumerate(a.T):
+                slope = np.polynomial.polynomial.polyder(column)
+                turns = np.roots(slope[::-1]) if slope.any() else []
+                inside = [0.0, h, *(float(r.real) for r in turns if abs(r.imag) < 1e-9 and 0 < r.real < h)]
+                values = np.polynomial.polynomial.polyval(inside, column)
+                assert (low - slack)[j] <= values.min(), (order, j)
+                assert values.max() <= (high + slack)[j], (order, j)
+            ends.append(np.polynomial.polynomial.polyval([0.0, h], a))
         if before is not None:
-            assert np.abs(q[0] - before[0]).max() <= 1e-9
-            assert np.abs(qd[0] - before[1]).max() <= 1e-9
-            jumps += bool(np.abs(qdd[0] - before[2]).max() > 1e-9)
-        before = (q[-1], qd[-1], qdd[-1])
+            assert np.abs(ends[0][:, 0] - before[0]).max() <= 1e-9
+            assert np.abs(ends[1][:, 0] - before[1]).max() <= 1e-9
+            jumps += bool(np.abs(ends[2][:, 0] - before[2]).max() > 1e-9)
+        before = [end[:, 1] for end in ends]
     assert jumps <= 2 * noted
 
 
@@ -254,33 +253,28 @@ def exact_deviation(hand: Hand, twist: np.ndarray, end: float, begin: float = 0.
     v, w = twist[:3], twist[3:]
     way = (X[:, :3, 3] - X[0, :3, 3]) @ v / (v @ v)
     off = np.linalg.norm(X[:, :3, 3] - X[0, :3, 3] - way[:, None] * v, axis=1).max()
-    turned = 0.0
-    for s, R in zip(way, X[:, :3, :3] @ X[0, :3, :3].T, strict=True):
-        turn = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-        turned = max(turned, float(np.linalg.norm(turn * (1 + turn @ turn / 6) - s * w)))
+    turn = Rotation.from_matrix(X[:, :3, :3] @ X[0, :3, :3].T).as_rotvec()
+    turned = float(np.linalg.norm(turn - way[:, None] * w, axis=1).max())
     return float(off), turned
 
 
-def test_a_twist_is_followed_for_the_whole_hold():
+def test_a_twist_is_followed_for_the_whole_hold_and_while_it_stops():
     rng = np.random.default_rng(3)
     tried = 0
     while tried < 25:
         q = rng.uniform(LIMITS.q_min + 0.8, LIMITS.q_max - 0.8)
         twist = np.concatenate([rng.normal(size=3), rng.normal(size=3) * 0.3])
         twist[:3] *= 0.25 / np.linalg.norm(twist[:3])
+        if condition(q) > 15:
+            continue
+        tried += 1
         hand = Hand(q)
         for k in range(21):
             hand.give(0.02 * k, twist=twist)
-        places = hand.timeline.sample(np.linspace(0, 0.8, 20))
-        inside = ((places > LIMITS.q_min + 0.2) & (places < LIMITS.q_max - 0.2)).all()
-        if not inside or max(condition(place) for place in places) > 10:
-            continue
-        tried += 1
-        # From rest with an input every 20 ms, then at full speed without another.
-        for begin, end, mm, degrees in ((0.0, 0.4, 0.1, 0.05), (0.4, 0.4 + HOLD, 0.5, 0.2)):
-            off, turned = exact_deviation(hand, twist, end, begin)
-            assert off <= 1e-3 * mm
-            assert turned <= np.radians(degrees)
+        # To limits, to singularities, or for as long as it's asked.
+        off, turned = exact_deviation(hand, twist, hand.timeline.end)
+        assert off <= 1e-5
+        assert turned <= 1e-4
 
 
 @pytest.mark.parametrize("dt", [0.2, 0.02, 0.005])
@@ -289,9 +283,9 @@ def test_slow_and_quick_inputs_give_the_same_path(dt: float):
     twist = np.array([0.1, 0.15, -0.1, 0.2, 0.0, 0.1])
     for k in range(round(1.0 / dt)):
         hand.give(dt * k, twist=twist)
-    off, turned = exact_deviation(hand, twist, 1.0)
-    assert off <= 1e-3
-    assert turned <= np.radians(0.5)
+    off, turned = exact_deviation(hand, twist, hand.timeline.end)
+    assert off <= 1e-5
+    assert turned <= 1e-4
 
 
 def test_the_tool_frame_turns_with_the_tool():
@@ -304,7 +298,10 @@ def test_the_tool_frame_turns_with_the_tool():
         q, qd = hand.timeline.sample(moment), hand.timeline.sample(moment, derivative=1)
         R = MODEL.forward(q)[:3, :3]
         v, w = np.split(MODEL.jacobian(q) @ qd, 2)
-        assert np.concatenate([R.T @ v, R.T @ w]) == pytest.approx(twist, abs=2e-3)
+        got = np.concatenate([R.T @ v, R.T @ w])
+        # Slow inputs near a singularity: the wrist is about to brake.
+        assert 0.95 < got @ twist / (twist @ twist) < 1.01
+        assert got == pytest.approx(got @ twist / (twist @ twist) * twist, abs=1e-4)
 
 
 WRIST = np.array([0, 0.7, -2.6, 0.3, 0.6, 0])
@@ -359,52 +356,40 @@ def test_from_ready_possible_directions_move_and_impossible_ones_do_nothing(axis
     check_laws(hand.timeline)
 
 
-def test_a_joint_at_its_limit_is_taken_out_and_the_tool_goes_no_other_way():
+@pytest.mark.parametrize("joint", range(6))
+def test_the_tool_stops_on_its_way_where_a_joint_comes_to_its_limit(joint: int):
     q = np.array([0.3, 0.8, -2.6, 0.2, 0.5, 0.0])
-    q[3] = LIMITS.q_max[3] - 0.05
-    twist = np.asarray(MODEL.jacobian(q) @ [0.05, 0.05, 0.05, 0.5, 0.05, 0.05])
+    q[joint] = LIMITS.q_max[joint] - 0.15
+    rates = np.full(6, 0.05)
+    rates[joint] = 0.5
+    twist = np.asarray(MODEL.jacobian(q) @ rates)
     hand = Hand(q)
     for k in range(80):
         hand.give(0.02 * k, twist=twist)
-    at = hand.timeline.sample(1.55)
-    assert LIMITS.q_max[3] - 2e-3 < at[3] <= LIMITS.q_max[3] + 1e-9
-    qd = hand.timeline.sample(1.55, derivative=1)
-    assert abs(qd[3]) < 0.02
-    J = weighted_jacobian(MODEL, at[None])[0]
-    got, asked = J @ qd, twist / np.repeat([0.4318, 1.0], 3)
-    # What the others can do best is the projection of what was asked: shorter, and at right angles to the rest.
-    assert np.linalg.norm(got) <= np.linalg.norm(asked) * 1.01
-    others = np.delete(J, 3, axis=1)
-    best = others @ np.linalg.lstsq(others, asked, rcond=None)[0]
-    assert np.abs(got - best).max() < 0.05 * np.linalg.norm(asked)
+    off, turned = exact_deviation(hand, twist, hand.timeline.end)
+    assert off <= 1e-5
+    assert turned <= 1e-4
+    assert LIMITS.q_max[joint] - 0.03 < hand.timeline.sample(1.58)[joint]
+    assert np.abs(hand.timeline.sample(1.58, derivative=1)).max() < 0.02
     check_laws(hand.timeline)
+    for k in range(40):
+        hand.give(1.6 + 0.02 * k, twist=-twist)
+    assert hand.timeline.sample(2.4)[joint] < LIMITS.q_max[joint] - 0.15, "it goes back at once"
 
 
-def test_sliding_meets_the_conditions_of_the_best_bounded_rates():
-    rng = np.random.default_rng(8)
-    for _ in range(50):
-        q = rng.uniform(LIMITS.q_min, LIMITS.q_max)
-        if condition(q) > 50:
-            continue
-        J, twist = weighted_jacobian(MODEL, q[None])[0], rng.normal(size=6)
-        low, high = -rng.uniform(0, 2, 6), rng.uniform(0, 2, 6)
-        u = sliding_rates(J, twist, low, high)
-        assert (u >= low - 1e-12).all()
-        assert (u <= high + 1e-12).all()
-        free = (u > low + 1e-12) & (u < high - 1e-12)
-        if np.linalg.cond(J[:, free]) < 50 if free.any() else False:
-            assert np.abs(J[:, free].T @ (J @ u - twist)).max() < 1e-9
-
-
-def test_damped_rates_are_exact_away_from_singularities_and_bounded_at_them():
+def test_inverses_are_exact_away_from_singularities_and_bounded_at_them():
     rng = np.random.default_rng(9)
     q = rng.uniform(LIMITS.q_min, LIMITS.q_max, (200, 6))
     q[::4, 4] = rng.uniform(-0.05, 0.05, 50)
     J = weighted_jacobian(MODEL, q)
-    twists = rng.normal(size=(200, 6))
-    u, near = damped_rates(J, twists)
     S = np.linalg.svd(J, compute_uv=False)
+    P, near = damped_inverses(J)
     assert np.abs(near) == pytest.approx(S[:, -1] / S[:, 0], abs=1e-12)
     sound = S[:, 0] / S[:, -1] < 99
-    assert np.abs((J @ u[:, :, None])[sound, :, 0] - twists[sound]).max() < 1e-10
-    assert (np.linalg.norm(u, axis=1) <= 100.0 / S[:, 0] * np.linalg.norm(twists, axis=1) * (1 + 1e-9)).all()
+    assert np.abs((J @ P)[sound] - np.eye(6)).max() < 1e-10
+    assert (np.linalg.norm(P, ord=2, axis=(1, 2)) <= 100.0 / S[:, 0] * (1 + 1e-9)).all()
+    # Those of one place at a time are the same, whichever way is quick there.
+    for k in range(0, 200, 7):
+        alone, close = inverses(MODEL, q[k : k + 1], J[k : k + 1])
+        assert alone[0] == pytest.approx(P[k], rel=1e-9, abs=1e-9)
+        assert abs(close[0]) <= abs(near[k]) * (1 + 1e-12)

@@ -3,10 +3,10 @@
 Every plan ends at rest, so the watchdog is in the plan: what no further input replaces stops the arm. Each joint
 goes to a rate under bounded jerk, holds it, then rests, never beyond its position limits.
 
-A tool twist asks rates of the joints, from the Jacobian, at the start and on the way. Lengths are divided by the
-model's characteristic length, so that linear and angular rows compare. One time law s(t) holds for all joints: the
-tool goes along the asked-for twist at s(t) times its speed. What the arm moves beside that at the start (it came
-from another direction) dies away as a transient of its own.
+A tool twist leads through poses that are known: the joints there are found at some places ahead, and joined by one
+polynomial. Lengths are divided by the model's characteristic length, so that linear and angular rows compare. One
+time law s(t) holds for all joints: the tool goes along the asked-for twist at s(t) times its speed. What the arm
+moves beside that at the start (it came from another direction) dies away as a transient of its own.
 
 One concept in over 600 lines: the plan of one steering input, by joint rates or by a twist.
 """
@@ -20,7 +20,7 @@ from math import copysign, hypot, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vrs.checks import finite, finite_array
 from vrs.commands import Frame
@@ -30,6 +30,7 @@ from vrs.notes import Note, NoteCode, Notes
 from vrs.planning.certificate import violation
 from vrs.planning.online import roots
 from vrs.planning.parabolic import brake
+from vrs.planning.path import polynomial
 from vrs.planning.plan import Plan, empty, packed
 from vrs.planning.redundancy import TASK, stiffness, units
 from vrs.segment import State
@@ -327,7 +328,21 @@ SLOW_FROM = 30.0
 """Condition number from which approaching a singularity slows the tool."""
 STOP_AT = 100.0
 """Condition number at which approaching ends, and above which rates are damped."""
-_NODES = np.array([0.0, 0.3, 1.0])
+_WEIGHTED = 10.0
+"""By how much weights may make a condition number larger."""
+_NODES = np.array([0.0, 0.04, 0.14, 0.3, 0.5, 0.7, 0.87, 1.0])
+"""Where the way is looked at; the nearest, which is what is moved before the next input, the closest."""
+_DEGREES = np.arange(len(_NODES) + 1.0)
+"""Of a polynomial of which the values there, and the slope at 0, are known."""
+_POWERS = _NODES[:, None] ** _DEGREES
+_LED = _POWERS[:, 1:] / _DEGREES[1:] @ np.linalg.inv(_POWERS[:, :-1])
+"""What rates at the nodes lead to there, on a way of 1, (k, k)."""
+_THROUGH = np.linalg.inv(_POWERS[1:, 2:])
+"""The higher coefficients of a polynomial with value and slope 0 at 0, from its values, (k - 1, k - 1)."""
+_BENDS = _POWERS[:, :-2] * (_DEGREES * (_DEGREES - 1.0))[2:]
+"""Second derivatives at the nodes, on a way of 1, of the higher coefficients, (k, k - 1)."""
+_TWISTS = _POWERS[:, :-3] * (_DEGREES * (_DEGREES - 1.0) * (_DEGREES - 2.0))[3:]
+"""Third derivatives, (k, k - 2)."""
 _FINE = np.linspace(0.0, 1.0, 25)
 FREE = np.ones_like(_FINE)
 """Caps of a course that nothing slows; known by its identity."""
@@ -339,7 +354,7 @@ _SINGULAR = 0.1 / STOP_AT
 """σ_min / σ_max below which the sign of det J is noise."""
 _BRAKING = 0.8
 """Share of the acceleration limits with which joints slow before their position limits."""
-_SHORTEST = 0.01
+_SHORTEST = 1e-3
 """Shortest way that's looked at [s at full speed]."""
 
 
@@ -355,20 +370,36 @@ class Twist(NamedTuple):
 
     def after(self, s: Array) -> Array:
         """The twist at each of the times s [s] of motion at full speed, (k, 6)."""
-        v, w = self.linear, self.angular
-        rate = float(np.sqrt(w @ w))
-        if not self.turns or rate == 0.0:
-            return np.broadcast_to(np.concatenate([v, w]), (len(s), 6))
-        axis = w / rate
-        along = (axis @ v) * axis
-        c, d = np.cos(rate * s)[:, None], np.sin(rate * s)[:, None]
-        turned = along + c * (v - along) + d * _cross(axis, v)
-        return np.concatenate([turned, np.broadcast_to(w, (len(s), 3))], axis=1)
+        twists = np.empty((len(s), TASK))
+        twists[:, :3] = self._turned(s)[0] @ self.linear if self.turns else self.linear
+        twists[:, 3:] = self.angular
+        return twists
+
+    def leads(self, X: Array, s: Array) -> tuple[Array, Array]:
+        """Where it leads from a pose X, (4, 4), at each of the times s.
+
+        Returns:
+            Ways of the tool over the characteristic length, (k, 3), and its rotation matrices, (k, 3, 3).
+        """
+        turned, led = self._turned(s)
+        return led @ self.linear if self.turns else s[:, None] * self.linear, turned @ X[:3, :3]
+
+    def _turned(self, s: Array) -> tuple[Array, Array]:
+        """Rotations since the start at times s, (k, 3, 3), and their integrals over the time [s]."""
+        x, y, z = w = self.angular.tolist()
+        rate = hypot(*w) or 1.0
+        K = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))) / rate
+        angle = (rate * s)[:, None, None]
+        sine, rest = np.sin(angle), 1.0 - np.cos(angle)
+        return _EYE + sine * K + rest * (K @ K), (angle * _EYE + rest * K + (angle - sine) * (K @ K)) / rate
 
 
-def _cross(a: Array, b: Array) -> Array:
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+_EYE = np.eye(3)
+
+
+def _axial(M: Array) -> Array:
+    """Σ a × b for M = Σ a bᵀ, (..., 3, 3): (..., 3)."""
+    return np.asarray(M[..., (1, 2, 0), (2, 0, 1)] - M[..., (2, 0, 1), (1, 2, 0)])
 
 
 def weighted_jacobian(model: RobotModel, q: Array) -> Array:
@@ -378,58 +409,66 @@ def weighted_jacobian(model: RobotModel, q: Array) -> Array:
     return J
 
 
-def damped_rates(J: Array, twists: Array) -> tuple[Array, Array]:
-    """Least rates that give the twists, damped where the condition number is above STOP_AT.
+def damped_inverses(J: Array, stop_at: float = STOP_AT) -> tuple[Array, Array]:
+    """What makes least rates of twists, damped where the condition number is above `stop_at`.
 
-    A singular value σ below ε = σ_max / STOP_AT answers with σ/ε² instead of 1/σ: continuous, and 0 for the
+    A singular value σ below ε = σ_max / stop_at answers with σ/ε² instead of 1/σ: continuous, and 0 for the
     directions in which the tool can't go.
 
     Args:
-        J: Jacobians, (k, 6, n).
-        twists: (k, 6).
+        J: Jacobians, (k, m, n).
+        stop_at: See above.
 
     Returns:
-        Rates [rad/s], (k, n), and σ_min / σ_max with the sign of det J (J square), (k,).
+        (k, n, m), and σ_min / σ_max with the sign of det J (J square), (k,).
     """
     U, S, Vt = np.linalg.svd(J, full_matrices=False)
-    floor = S[:, :1] / STOP_AT
+    floor = S[:, :1] / stop_at
     answer = 1.0 / np.maximum(np.maximum(S, floor), 1e-300)
     answer *= np.minimum(S / np.maximum(floor, 1e-300), 1.0)
-    parts = answer * (twists[:, None] @ U)[:, 0]
-    u = (parts[:, None] @ Vt)[:, 0]
     nearness = S[:, -1] / np.maximum(S[:, 0], 1e-300)
     if J.shape[1] == J.shape[2]:
         nearness = nearness * np.where(np.linalg.det(J) < 0.0, -1.0, 1.0)
-    return u, nearness
+    return (Vt.swapaxes(1, 2) * answer[:, None]) @ U.swapaxes(1, 2), nearness
 
 
-def position_first(J: Array, twists: Array) -> tuple[Array, Array]:
-    """Rates of arms of fewer than six joints: the position goes as asked, and the tool turns as that admits.
+def _plain_inverses(J: Array) -> tuple[Array, Array] | None:
+    """The same of Jacobians (k, 6, n ≥ 6) far from singularities, σ_min / σ_max or less of it; None of others."""
+    JT = J.swapaxes(1, 2)
+    try:
+        P = np.asarray(np.linalg.inv(J) if J.shape[1] == J.shape[2] else JT @ np.linalg.inv(J @ JT))
+    except np.linalg.LinAlgError:
+        return None
+    nearness = 1.0 / np.sqrt(np.einsum("kij,kij->k", J, J) * np.einsum("kij,kij->k", P, P))
+    return (P, nearness) if float(nearness.min()) > 1.0 / SLOW_FROM else None
+
+
+def position_first(J: Array) -> tuple[Array, Array]:
+    """The same of arms of fewer than six joints: the position goes as asked, and the tool turns as that admits.
 
     Args:
         J: Jacobians, (k, 6, n).
-        twists: (k, 6).
 
     Returns:
-        Rates [rad/s], (k, n), damped as by `damped_rates`, and σ_min / σ_max of the linear rows, (k,).
+        (k, n, 6), damped as by `damped_inverses`, and σ_min / σ_max of the linear rows, (k,).
     """
     linear, angular = J[:, :3], J[:, 3:]
     U, S, Vt = np.linalg.svd(linear)
     m = S.shape[1]
     floor = np.maximum(S[:, :1] / STOP_AT, 1e-300)
     share = np.minimum(S / floor, 1.0)
-    parts = share / np.maximum(S, floor) * (twists[:, None, :3] @ U)[:, 0, :m]
-    u = (parts[:, None] @ Vt[:, :m])[:, 0]
+    answer = share / np.maximum(S, floor)
+    ways = (Vt[:, :m].swapaxes(1, 2) * answer[:, None]) @ U[:, :, :m].swapaxes(1, 2)
     left = np.ones(Vt.shape[:2])
     left[:, :m] -= share * share
     free = left[:, :, None] * Vt
-    turn = twists[:, 3:] - (angular @ u[:, :, None])[:, :, 0]
-    beside, _ = damped_rates(angular @ free.swapaxes(1, 2), turn)
-    return u + (beside[:, None] @ free)[:, 0], S[:, -1] / np.maximum(S[:, 0], 1e-300)
+    turns = free.swapaxes(1, 2) @ damped_inverses(angular @ free.swapaxes(1, 2))[0]
+    both = np.concatenate([ways - turns @ (angular @ ways), turns], axis=2)
+    return both, S[:, -1] / np.maximum(S[:, 0], 1e-300)
 
 
-def eased_rates(model: RobotModel, q: Array, J: Array, twists: Array) -> tuple[Array, Array]:
-    """Rates that give twists, as an arm of any number of joints takes them; they're damped as by `damped_rates`.
+def inverses(model: RobotModel, q: Array, J: Array, held: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+    """What makes joint rates of twists, as an arm of any number of joints takes them.
 
     Those of a redundant arm are the least by the weights of `stiffness`: joints near their limits move less.
 
@@ -437,43 +476,54 @@ def eased_rates(model: RobotModel, q: Array, J: Array, twists: Array) -> tuple[A
         model: The arm.
         q: Joint positions, (k, n).
         J: Jacobians there, (k, 6, n).
-        twists: (k, 6).
+        held: Which joints of a redundant arm stay where they are, (n,); none unless given.
+
+    Returns:
+        (k, n, 6), damped as by `damped_inverses`, and σ_min / σ_max, (k,).
     """
     n = J.shape[2]
     if n < TASK:
-        return position_first(J, twists)
+        return position_first(J)
     if n == TASK:
-        return damped_rates(J, twists)
-    unit = units(model.prismatic, n, model.characteristic_length)
-    ease = unit / np.sqrt(stiffness(q, model.limits))
-    return ease * damped_rates(J * ease[:, None], twists)[0], _nearness(J)
+        return _plain_inverses(J) or damped_inverses(J)
+    ease = units(model.prismatic, n, model.characteristic_length) / np.sqrt(stiffness(q, model.limits))
+    if held is not None:
+        ease, J = ease * ~held, J * ~held
+    eased = J * ease[:, None]
+    plain = None if held is not None else _plain_inverses(eased)
+    if plain is not None:
+        # The weights' own condition bounds what they hide.
+        near = plain[1] * (ease.min(axis=1) / ease.max(axis=1))
+        if float(near.min()) > 1.0 / SLOW_FROM:
+            return ease[:, :, None] * plain[0], near
+    # The weights are no reason to damp what the arm can do.
+    return ease[:, :, None] * damped_inverses(eased, _WEIGHTED * STOP_AT)[0], _nearness(J)
 
 
-def sliding_rates(J: Array, twist: Array, low: Array, high: Array) -> Array:
-    """The rates that come nearest to a twist with some of them bounded, (n,).
+def bend_along(J: Array, P: Array, u: Array, twist: Twist) -> Array:
+    """How joint rates change on the way along a twist [rad/s²], at its start, (n,).
 
-    The joint that passes its bound by most is set to it and the others are solved again, until none does.
+    Of a redundant arm, and where rates are damped, nearly.
 
     Args:
-        J: Jacobian, (6, n).
-        twist: (6,).
-        low: Lowest rates [rad/s], (n,), not positive.
-        high: Highest rates [rad/s], (n,), not negative.
+        J: The Jacobian there, (6, n).
+        P: What makes rates of twists, (n, 6).
+        u: Rates [rad/s], (n,).
+        twist: What is followed.
     """
-    n = J.shape[1]
-    u = np.zeros(n)
-    free = np.ones(n, dtype=bool)
-    solve = position_first if n < TASK else damped_rates
-    while free.any():
-        left = twist - J[:, ~free] @ u[~free]
-        u[free] = solve(J[None, :, free], left[None])[0][0]
-        over = np.where(free, np.maximum(u - high, low - u), -np.inf)
-        worst = int(np.argmax(over))
-        if over[worst] <= 0.0:
-            break
-        u[worst] = min(max(u[worst], low[worst]), high[worst])
-        free[worst] = False
-    return u
+    # Joints turn the axes of those behind them, and what these carry.
+    turns = J[3:] * u
+    until = np.add.accumulate(turns, axis=1)
+    before = until - turns
+    change_here = np.concatenate([_axial((until + before) @ (J[:3] * u).T), _axial(before @ turns.T)])
+    if twist.turns:
+        change_here[:3] -= np.cross(twist.angular, twist.linear)
+    return np.asarray(-P @ change_here)
+
+
+def _rates(P: Array, twists: Array) -> Array:
+    """Rates of twists (k, 6) by inverses (k, n, 6): (k, n)."""
+    return np.asarray((P @ twists[:, :, None])[:, :, 0])
 
 
 def rates_to_limits(q: Array, limits: Limits) -> tuple[Array, Array]:
@@ -486,82 +536,168 @@ def rates_to_limits(q: Array, limits: Limits) -> tuple[Array, Array]:
 
 
 class TwistCourse(NamedTuple):
-    """The joint rates along the twist, as functions of the way s [s at full speed]."""
+    """The joints along the twist, as functions of the way s [s at full speed]."""
 
-    u: Array
-    """Rates at the start [rad/s], (n,)."""
-    slope: Array
-    curve: Array
-    offset: Array
-    """What the rates change by when the transient has moved the arm aside."""
-    seen: float
-    """How far they hold [s]."""
+    path: Array
+    """Joint positions, from where it begins: ascending powers of s, (k + 1, n), the first 0."""
+    A: Array
+    """Largest rate of the share there that the acceleration limits leave [1/s], (k,)."""
+    J: Array
+    """Largest rate of that [1/s²], (k,)."""
     grid: Array
     """Ways at which the speed is bounded [s], (k,)."""
     caps: Array
     """Largest share of the asked-for speed there, (k,)."""
 
+    def ending(self) -> TwistCourse:
+        """The same for those who don't go beyond."""
+        caps, ones = np.array(self.caps), np.ones_like(self.grid)
+        caps[-1] = 0.0
+        return self._replace(caps=caps, A=self.A * ones, J=self.J * ones)
+
 
 def course(
-    model: RobotModel, q: Array, u: Array, aside: Array, twist: Twist, reach: float, limits: Limits
+    model: RobotModel,
+    q: Array,
+    u: Array,
+    bend: Array,
+    twist: Twist,
+    reach: float,
+    limits: Limits,
+    held: NDArray[np.bool_] | None = None,
 ) -> TwistCourse:
-    """Sample rates and condition numbers on the way.
+    """Find the joints on the way.
 
     Args:
         model: The arm.
-        q: Start [rad], (n,).
-        u: Rates there [rad/s], (n,).
-        aside: Where the transient leaves the arm, from q [rad], (n,).
+        q: Where it begins [rad], (n,).
+        u: Rates there, nearly [rad/s], (n,).
+        bend: How they change, nearly [rad/s²], (n,).
         twist: What to follow.
         reach: How far to look [s at full speed].
-        limits: Their speeds bound the share.
+        limits: Their speeds and positions bound the share.
+        held: Joints of a redundant arm that stay where they are, (n,); none unless given.
     """
     seen = reach
-    for _ in range(3):
+    while True:
         ways = seen * _NODES
-        places = q + aside + ways[:, None] * u
-        rates, near = eased_rates(model, places, weighted_jacobian(model, places), twist.after(ways))
-        if len(q) != TASK:
-            # The rates of a redundant arm bend so much that it shows in where they lead.
-            places = q + aside + _led(rates, ways)
-            rates, near = eased_rates(model, places, weighted_jacobian(model, places), twist.after(ways))
-        # Rates near a singularity change like 1 / σ_min: no parabola fits them over a longer way.
-        change_here = float(np.abs(near[1:] - near[0]).max()) / max(abs(float(near[0])), 1.0 / STOP_AT)
-        if change_here <= 0.6 or seen <= _SHORTEST:
+        on_way, rates, near, share = _followed(model, q, u, bend, twist, ways, held)
+        if share == 1.0 or seen <= _SHORTEST:
             break
-        seen = max(0.5 * seen / change_here, _SHORTEST)
-    offset = rates[0] - u
-    slope, curve = _parabola(rates, ways, seen)
-    fastest = _SPEED / (np.abs(rates) / limits.qd_max).max(axis=1)
-    grid = reach * _FINE
+        # Rates near a singularity change like 1 / σ_min: no polynomial fits them over a longer way.
+        seen = max(0.9 * share * seen, _SHORTEST)
+    # On the way as a share of it, and then as it is.
+    path = np.empty((len(_DEGREES), len(q)))
+    path[0], path[1] = 0.0, seen * rates[0]
+    path[2:] = _THROUGH @ (on_way[1:] - _NODES[1:, None] * path[1])
+    derivatives = np.abs(np.array((rates, (_BENDS @ path[2:]) / seen**2, (_TWISTS @ path[3:]) / seen**3)))
+    path *= (1.0 / seen) ** _DEGREES[:, None]
+    caps_at_nodes, A, J = _bounds(derivatives, limits)
+    grid = seen * _FINE
     caps = FREE
-    sharpest = float(((np.abs(slope) + seen * np.abs(curve)) / limits.qdd_max).max())
-    slowest = min(float(fastest.min()), sqrt(0.5 / max(sharpest, 0.5)))
-    if slowest < 1.0:
-        caps = np.minimum(np.interp(grid, ways, fastest), sqrt(0.5 / max(sharpest, 0.5)))
+    if caps_at_nodes.min() < 1.0:
+        caps = np.interp(grid, ways, caps_at_nodes)
     sign = -1.0 if near[0] < 0.0 else 1.0
     if (sign * near).min() < 1.0 / SLOW_FROM or seen < reach:
-        ahead = np.interp(grid, ways, near)
-        ahead += np.maximum(grid - seen, 0.0) * float(near[2] - near[1]) / float(ways[2] - ways[1])
-        caps = np.minimum(caps, _share(ahead, grid, sqrt(float(u @ u))))
-    return TwistCourse(u, slope, curve, offset, seen, grid, caps)
+        caps = np.minimum(caps, _share(np.interp(grid, ways, near), grid, sqrt(float(u @ u))))
+        caps[-1] = 0.0 if seen < reach else caps[-1]
+    places = q + on_way
+    if (places < limits.q_min).any() or (places > limits.q_max).any():
+        on = q + polynomial(path, grid)
+        out = (on < np.minimum(q, limits.q_min) - _NEAR_LIMIT) | (on > np.maximum(q, limits.q_max) + _NEAR_LIMIT)
+        if out.any():
+            caps = caps * (np.arange(len(grid)) < out.any(axis=1).argmax() - 1)
+    if caps is FREE:
+        return TwistCourse(path, A.min(keepdims=True), J.min(keepdims=True), grid, caps)
+    return TwistCourse(path, np.interp(grid, ways, A), np.interp(grid, ways, J), grid, caps)
 
 
-def _parabola(rates: Array, ways: Array, seen: float) -> tuple[Array, Array]:
-    """First and second derivative, at the first of three ways, of the parabola through rates, (3, n).
+def _followed(
+    model: RobotModel,
+    q: Array,
+    u: Array,
+    bend: Array,
+    twist: Twist,
+    ways: Array,
+    held: NDArray[np.bool_] | None,
+) -> tuple[Array, Array, Array, float]:
+    """Find the joints at some ways along a twist, by Newton's method; inverses serve again where they're near.
 
-    `seen` is how long the way is that they're for [s].
+    Returns:
+        Joints from where the way begins, (k, n); rates there, (k, n); σ_min / σ_max there, (k,); the share of the
+        way that's even. Where that's less than 1, the joints are of no use.
     """
-    before, after = (rates[1] - rates[0]) / ways[1], (rates[2] - rates[1]) / (ways[2] - ways[1])
-    curve = 2.0 * (after - before) / seen
-    return before - 0.5 * curve * ways[1], curve
+    few = len(q) < TASK
+    twists = twist.after(ways)
+    on_way = ways[:, None] * (u + 0.5 * ways[:, None] * bend)
+    goal, missed, off = None, twists, np.inf
+    for _ in range(_CORRECTIONS):
+        if off > _COARSE:
+            looked_at = on_way
+            J = weighted_jacobian(model, q + on_way)
+            P, near = inverses(model, q + on_way, J, held)
+            rates, share = _rates(P, twists), _even(P, near)
+            if share < 1.0 and float(ways[-1]) > _SHORTEST:
+                break
+        on_way = on_way + _rates(P, missed) if goal else float(ways[-1]) * (_LED @ rates)
+        if (goal and off * float(np.abs(on_way - looked_at).max()) < _NEARLY) or not _exact(J, near, rates, twists):
+            break
+        X = model.forward(q + on_way)
+        goal = goal or twist.leads(X[0], ways)
+        missed = np.zeros_like(twists)
+        missed[:, :3] = goal[0] - (X[:, :3, 3] - X[0, :3, 3]) / model.characteristic_length
+        if not few:
+            missed[:, 3:] = 0.5 * _axial(X[:, :3, :3] @ goal[1].swapaxes(1, 2))
+        off = float(np.abs(missed).max())
+    return on_way, rates, near, share
 
 
-def _led(rates: Array, ways: Array) -> Array:
-    """Where rates, (3, n), lead on three ways, (3, n)."""
-    slope, curve = _parabola(rates, ways, float(ways[2]))
-    s = ways[:, None]
-    return np.asarray(s * (rates[0] + s * (slope / 2.0 + s * curve / 6.0)))
+def _exact(J: Array, near: Array, rates: Array, twists: Array) -> bool:
+    """Whether rates, (k, n), by J, (k, 6, n), give twists, (k, 6); of fewer than six joints, their linear part."""
+    if J.shape[2] >= TASK:
+        return float(np.abs(near).min()) > 1.0 / STOP_AT
+    return float(np.abs((J[:, :3] @ rates[:, :, None])[:, :, 0] - twists[:, :3]).max()) < _FOLLOWED
+
+
+def _bounds(derivatives: Array, limits: Limits) -> tuple[Array, Array, Array]:
+    """What the limits leave of the speed along the twist, where the way's derivatives are known.
+
+    Args:
+        derivatives: Sizes of the joints' first, second and third derivative by the way, (3, k, n).
+        limits: Of the joints.
+
+    Returns:
+        The largest share of the speed, the largest rate of that [1/s], and of that in turn [1/s²], (k,) each.
+    """
+    # By derivative and limit, the joint that counts.
+    ((speed, rate, jerk), (_, bent, bent_jerk), (_, _, twisted)) = (
+        derivatives[:, None] / np.array((limits.qd_max, limits.qdd_max, limits.qddd_max))[:, None]
+    ).max(axis=3)
+    shares = np.minimum(
+        _SPEED / speed,
+        np.minimum(np.sqrt(_BENT / np.maximum(bent, _BENT)), np.cbrt(_JERKED / np.maximum(twisted, _JERKED))),
+    )
+    s = np.minimum(shares, 1.0)
+    return shares, 1.0 / np.maximum(rate / (1.0 - s * s * bent), 6.0 * s * bent_jerk), 0.7 / jerk
+
+
+def _even(P: Array, near: Array) -> float:
+    """On which share of the way σ_min / σ_max changes little; if not of six joints, the inverses too.
+
+    Args:
+        P: Inverses, (k, n, 6).
+        near: σ_min / σ_max, (k,).
+    """
+    n = P.shape[1]
+    changes = np.abs(near - near[0]) / max(abs(float(near[0])), 1.0 / STOP_AT)
+    if n != TASK:
+        moved = 0.5 * np.abs(P - P[0]).max(axis=(1, 2)) / float(np.abs(P[0]).max())
+        changes = moved if n < TASK else np.maximum(changes, moved)
+    first = int((changes > _CHANGE).argmax())
+    if first == 0:
+        return 1.0
+    (low, high), (start, end) = changes[first - 1 : first + 1].tolist(), _NODES[first - 1 : first + 1].tolist()
+    return float(start + (end - start) * (_CHANGE - low) / (high - low))
 
 
 def _share(near: Array, way: Array, rate: float) -> Array:
@@ -585,6 +721,15 @@ def _share(near: Array, way: Array, rate: float) -> Array:
     return np.asarray(share)
 
 
+_CORRECTIONS, _COARSE, _NEARLY = 4, 1e-3, 3e-6
+"""How often the places on the way are looked for at most; from what they miss on [rad] other inverses are needed;
+and what they may miss in the end."""
+_CHANGE = 0.5
+"""By which part σ_min / σ_max may change on a way that polynomials fit."""
+_BENT, _JERKED = 0.4, 0.4
+"""Shares of the acceleration and jerk limits for the bend of the way, and for how that changes."""
+_FOLLOWED = 1e-6
+"""By how much rates may miss a twist that the arm follows [rad/s]."""
 STANDING = 1e-9
 """Share of the speed limits below which a joint doesn't move."""
 
@@ -593,34 +738,33 @@ _BUDGETS = ((0.85, 0.1, 1.0), (0.5, 0.4, 0.6), (0.3, 0.25, 0.3))
 turn. A shorter hold stops before a position limit that the longer one would pass."""
 _TRANSIENTS = (0.06, 0.09, 0.12, 0.15, 0.19, 0.24, 0.3, 0.38, 0.48, 0.6, 0.75, 0.95)
 """Durations of a transient to try [s]."""
-_GAP = 0.06
-"""Longest segment [s]: accelerations run straight in it."""
+_GAP = 0.1
+"""Longest segment [s]: a polynomial of the fifth degree."""
 _NEAR = 4e-3
 """Knots nearer than this [s] become one."""
-_CLOSE = 0.01
+_CLOSE = 1e-4
 """Share of the asked-for speed that the time law leaves to the transient."""
-_AHEAD = 0.12
+_AHEAD = 0.2
 """How far beyond the hold the way is looked at [s at full speed]."""
-_STOP = 0.8
+_STOP = 0.95
 """How long after the hold the arm may still move [s]: each joint by itself stops in about half of that."""
-_FOUR = np.arange(4.0)
 
 
 def transient(dv: Array, da: Array, T: float) -> Array:
-    """Bring a rate dv and an acceleration da to nothing in T, with the least squared jerk.
+    """Bring a rate and an acceleration to nothing in T, with the least squared jerk.
 
     Returns:
-        Accelerations at four knots, the last one 0, (4, n); they run straight between them.
+        Where that leads: ascending powers of the time, (5, n), the first 0.
     """
-    half = -1.5 / T * dv - 0.25 * da
-    bend = da / 6.0
-    return np.array([da, half + bend, half - bend, np.zeros_like(da)])
+    end = dv / T
+    return np.array((np.zeros_like(dv), dv, 0.5 * da, -(end + da / 1.5) / T, (0.5 * end + 0.25 * da) / (T * T)))
 
 
-def displacement(dv: Array, a: Array, T: float) -> Array:
-    """Where a transient ends, from where it began at the rate dv [rad], (n,)."""
-    h = T / 3.0
-    return np.asarray(3.0 * h * dv + h * h * (a[0] * (4.0 / 3.0) + a[1] * 2.0 + a[2]))
+_START = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 0.5], [-10, -6, -1.5], [15, 8, 1.5], [-6, -3, -0.5]])
+_END = np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]])
+_BETWEEN = np.concatenate([_START, _END], axis=1)
+"""Coefficients of the polynomial of the fifth degree on [0, 1] with given position, rate, acceleration at its start
+and its end."""
 
 
 def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
@@ -630,7 +774,7 @@ def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
     T = next(tried)
     for v, a, A, J in joints:
         # A longer duration asks less of every joint, unless a itself is the reason.
-        while not _kept(v, a, share * A, share * J * T / 3.0, T):
+        while not _kept(v, a, share * A, share * J * T, T):
             longer = next(tried, None)
             if longer is None:
                 return T
@@ -639,11 +783,11 @@ def shortest(dv: Array, da: Array, limits: Limits, share: float) -> float:
 
 
 def _kept(v: float, a: float, A: float, step: float, T: float) -> bool:
-    """Whether one joint's transient keeps accelerations A, and changes of them from knot to knot of `step`."""
-    half, bend = -1.5 / T * v - 0.25 * a, a / 6.0
-    first, second = half + bend, half - bend
-    most = max(abs(first - a), abs(second - first), abs(second))
-    return max(abs(first), abs(second)) <= A and most <= step
+    """Whether one joint's transient keeps accelerations A, and changes of them in T of `step`."""
+    c = -6.0 * v / T - 3.0 * a
+    if max(abs(c - a), abs(c + a)) > step:
+        return False
+    return abs(c) <= abs(a) or abs(a + (c - a) ** 2 / (4.0 * c)) <= A
 
 
 class SpeedLaw(NamedTuple):
@@ -662,27 +806,30 @@ class SpeedLaw(NamedTuple):
         return x + u * (v + u * (a / 2 + u * j / 6)), v + u * (a + u * j / 2), a + u * j
 
 
-def reachable(way: TwistCourse, A: float, J: float) -> Array:
+def reachable(way: TwistCourse, part: float) -> Array:
     """Largest share at each place of the grid from which the caps ahead can still be kept, (k,).
 
     Args:
         way: With the caps.
-        A: Largest rate of the share [1/s]; half of it is counted on.
-        J: Largest rate of that [1/s²].
+        part: What of its A and J is used; of A half is counted on.
     """
     if way.caps is FREE:
         return FREE
-    later = way.grid[None] - way.grid[:, None]
-    lag = 0.25 * A * A / J
-    brakes = way.caps + np.sqrt(lag * lag + A * np.maximum(later, 0.0)) - lag
-    share = np.where(later >= 0.0, brakes, np.inf).min(axis=1)
+    later = 0.0
+    shares: list[float] = []
+    gap = float(way.grid[1])
+    for cap, A, J in zip(way.caps[::-1].tolist(), way.A[::-1].tolist(), way.J[::-1].tolist(), strict=True):
+        lag = 0.25 * part * A * A / J
+        later = min(cap, sqrt((later + lag) ** 2 + part * A * gap) - lag) if shares else cap
+        shares.append(later)
+    share = np.array(shares[::-1])
     # Nothing is to be had beyond a place that mustn't be passed.
     share[np.minimum.accumulate(way.caps) <= 0.0] = 0.0
-    return np.asarray(share)
+    return share
 
 
 def speed_law(
-    s: float, ds: float, goal: float, hold: float, way: TwistCourse, A: float, J: float
+    s: float, ds: float, goal: float, hold: float, way: TwistCourse, part: float
 ) -> tuple[SpeedLaw, float]:
     """Bring the share from s to its goal, keep under the caps on the way, stop after `hold`.
 
@@ -692,19 +839,25 @@ def speed_law(
         goal: Share asked for.
         hold: When the stop begins [s].
         way: With the caps.
-        A: Largest rate of the share [1/s].
-        J: Largest rate of that [1/s²].
+        part: What of its A and J is used.
 
     Returns:
         The law, and the share that may be had at the start.
     """
-    allowed = reachable(way, A, J)
-    steps = 1 if allowed.min() >= goal else 5
+    allowed = reachable(way, part)
+    As, Js = (part * way.A).tolist(), (part * way.J).tolist()
+    gap, last = float(way.grid[1]), len(As) - 1
+    capped = float(allowed[: int(max(s, goal) * hold / gap) + 2].min()) < goal
+    steps = 5 if capped else 1
     starts, states = [], []
     x, v, a, t = 0.0, s, ds, 0.0
-    parts: list[tuple[float, float]] = [(goal, hold)] if steps == 1 else [(-1.0, hold / steps)] * steps
-    for target, lasting in [*parts, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
-        u = target if target >= 0.0 else min(goal, float(np.interp(x, way.grid, allowed)))
+    for target, lasting in [*[(goal, hold / steps)] * steps, (0.0, np.inf)] if hold > 0.0 else [(0.0, np.inf)]:
+        # What holds from here to where the step, or the stop, ends.
+        here, fastest = min(max(int(x / gap), 0), last), abs(v) if capped else max(abs(v), target)
+        far = x + fastest * min(lasting, fastest / As[here] + As[here] / Js[here])
+        passed = slice(here, max(int(far / gap), here) + 2)
+        A, J = min(As[passed]), min(Js[passed])
+        u = min(target, *np.interp([x, far], way.grid, allowed).tolist()) if capped else target
         phases: JerkProfile = change(v, a, u, A, J)
         for h, j, after in cut(phases, a, lasting) if lasting < np.inf else phases:
             starts.append(t)
@@ -722,12 +875,12 @@ def along(
     state: State,
     model: RobotModel,
     u: Array,
+    bend: Array,
     twist: Twist,
     goal: float,
     hold: float,
     limits: Limits,
-    *,
-    blocked: bool = False,
+    held: NDArray[np.bool_] | None = None,
 ) -> tuple[Plan | None, float]:
     """Plan along a twist.
 
@@ -735,72 +888,74 @@ def along(
         state: Start.
         model: The arm.
         u: Joint rates of the twist at the start [rad/s], (n,).
+        bend: How they change on the way [rad/s²], (n,).
         twist: What to follow.
         goal: Share of its speed to reach.
         hold: When the stop begins [s].
         limits: Limits that hold at every instant.
-        blocked: Whether a joint at its limit is in the way, so that only the share is of use.
+        held: Joints of a redundant arm that stay where they are, (n,); none unless given.
 
     Returns:
-        A certified plan, or None where none of the budgets gives one; and the share of the speed that may be
-        had at the start.
+        A certified plan, or a stop on the way, or None where none of the budgets gives one; and the share of the
+        speed that may be had at the start.
     """
     # A joint counts by its share of the speed limits.
     onto_u = u / (limits.qd_max * limits.qd_max)
     onto_u = onto_u / float(onto_u @ u)
     s = float(state.qd @ onto_u)
     dv = state.qd - (goal if abs(s - goal) < _CLOSE else s) * u
-    still = np.zeros_like(u)
-    T = shortest(dv, still, limits, _BUDGETS[0][1])
-    aside = displacement(dv, transient(dv, still, T), T)
-    way = course(model, state.q, u, aside, twist, hold + _AHEAD, limits)
-    bent = state.qdd - s * s * way.slope
+    # Half of the way at that rate is where a transient leads.
+    aside = 0.5 * shortest(dv, np.zeros_like(u), limits, _BUDGETS[0][1]) * dv
+    way = course(model, state.q + aside, u, bend, twist, hold + _AHEAD, limits, held)
+    u, slope = way.path[1], 2.0 * way.path[2]
+    bent = state.qdd - s * s * slope
     ds = float(bent @ onto_u)
     target = min(goal, float(way.caps[0]))
     if abs(s - target) < _CLOSE and abs(ds) < 20.0 * _CLOSE:
         # Near enough to leave the rest to the transient, without knots of its own.
         s, ds = target, 0.0
     dv, da = state.qd - s * u, bent - ds * u
-    T = shortest(dv, da, limits, _BUDGETS[0][1])
-    size = np.abs(u) + np.abs(way.curve) * way.seen**2
-    bend = np.abs(way.slope) + np.abs(way.curve) * way.seen
-    sharpest = float((bend / limits.qddd_max).max())
-    for for_law, for_transient, part in _BUDGETS:
-        A = for_law / max(float((size / limits.qdd_max).max()), 10.0 * sharpest)
-        J = 0.7 * for_law / float((size / limits.qddd_max).max())
-        law, share = speed_law(s, ds, goal, part * hold, way, A, J)
-        if for_transient != _BUDGETS[0][1]:
+    for to in dict.fromkeys((goal, 0.0)):
+        for for_law, for_transient, part in _BUDGETS:
+            law, share = speed_law(s, ds, to, part * hold, way, for_law)
+            if float(law.state[0, -1]) > float(way.grid[-1]):
+                way = way.ending()
+                law, share = speed_law(s, ds, to, part * hold, way, for_law)
             T = shortest(dv, da, limits, for_transient)
-        if blocked or max(T, float(law.starts[-1])) > hold + _STOP:
-            break
-        plan = _composed(state, way, law, s, ds, T)
-        problem = violation(plan, limits, jerk=True)
-        if problem is None:
-            return plan, share
+            if max(T, float(law.starts[-1])) > hold + _STOP:
+                break
+            plan = _composed(state, way, law, transient(dv, da, T), T)
+            if violation(plan, limits, jerk=True) is None:
+                return plan, share
     return None, share
 
 
-def _composed(state: State, way: TwistCourse, law: SpeedLaw, s: float, ds: float, T: float) -> Plan:
-    """The course under the law, and a transient of duration T that meets the state."""
-    # The offset comes as 1 − (1 − t/T)².
-    du = s * s * way.slope + (2.0 * s / T) * way.offset
-    beside = transient(state.qd - s * way.u, state.qdd - ds * way.u - du, T)
-    t = _knots([*law.starts.tolist(), T / 3.0, 2.0 * T / 3.0, T])
+def _composed(state: State, way: TwistCourse, law: SpeedLaw, beside: Array, T: float) -> Plan:
+    """The course under the law, and beside it a transient of duration T that meets the state."""
+    t = _knots([*law.starts.tolist(), T])
     x, v, a = law.at(t)
-    left = np.maximum(1.0 - t / T, 0.0)
-    x, v, a, left = x[:, None], v[:, None], a[:, None], left[:, None]
-    u = way.u + (1.0 - left * left) * way.offset + x * (way.slope + 0.5 * x * way.curve)
-    du = (2.0 / T * left) * way.offset + v * (way.slope + x * way.curve)
-    hats = np.maximum(1.0 - np.abs((3.0 / T) * t[:, None] - _FOUR), 0.0)
-    accelerations = a * u + v * du + hats @ beside
-    accelerations[-1] = 0.0
+    # Positions from where the arm is, as the others would lose digits.
+    q, u, bend = _derivatives(way.path, x)
+    left, rate, change_here = _derivatives(beside, np.minimum(t, T))
+    v, a = v[:, None], a[:, None]
+    at = np.array((q + left, v * u + rate, a * u + v * v * bend + change_here))
+    at[1:, 0] = state.qd, state.qdd
+    at[1:, -1] = 0.0
     h = t[1:] - t[:-1]
-    # What straight lines between the knots left over of the rate goes where the arm is about to stop.
-    residue = state.qd + 0.5 * h @ (accelerations[1:] + accelerations[:-1])
-    tail = np.maximum(t - 0.4 * t[-1], 0.0) * (t[-1] - t)
-    accelerations -= (tail / (0.5 * h @ (tail[1:] + tail[:-1])))[:, None] * residue
-    jerks = (accelerations[1:] - accelerations[:-1]) / h[:, None]
-    return from_accelerations(state, h, accelerations[:-1], jerks)
+    powers = h[:, None] ** _DEGREES[:6]
+    scale = powers[:, :3].T[:, :, None]
+    c = _BETWEEN @ np.concatenate([at[:, :-1] * scale, at[:, 1:] * scale]).swapaxes(0, 1)
+    c /= powers[:, :, None]
+    c[:, 0] += state.q
+    return Plan(h, c)
+
+
+def _derivatives(c: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Values, slopes and bends at x, (k,), of ascending powers, (K, n): (k, n) each."""
+    degrees = _DEGREES[: len(c), None]
+    powers = x[:, None] ** degrees[:, 0]
+    slope = degrees[1:] * c[1:]
+    return powers @ c, powers[:, :-1] @ slope, powers[:, :-2] @ (degrees[1:-1] * slope[1:])
 
 
 def _knots(times: list[float]) -> Array:
@@ -893,24 +1048,46 @@ def _wanted(given: Array, frame: Frame, state: State, model: RobotModel) -> Twis
 def _by_twist(
     state: State, twist: Twist, hold: float, model: RobotModel, limits: Limits
 ) -> tuple[Plan, Notes, str]:
-    J = weighted_jacobian(model, state.q[None])
+    q = state.q[None]
+    J = weighted_jacobian(model, q)
     asked = np.concatenate([twist.linear, twist.angular])
-    u = eased_rates(model, state.q[None], J, asked[None])[0][0]
+    P, _ = inverses(model, q, J)
+    u = P[0] @ asked
     if hold == 0.0 or float((np.abs(u) / limits.qd_max).max()) < STANDING:
         stuck = hold > 0.0 and bool(asked.any())
-        return *_released(state, J[0], hold, model, limits), _stuck(state.q, model) if stuck else ""
-    low, high = rates_to_limits(state.q, limits)
-    blocked = bool((u < low).any() or (u > high).any())
-    plan, share = along(state, model, u, twist, 1.0, hold, limits, blocked=blocked)
+        return *_released(state, J[0], P[0], hold, model, limits), _stuck(state.q, model) if stuck else ""
     hindrance = _at_limit(state.q, u, limits, model)
+    held = None
+    if hindrance and len(u) > TASK:
+        held, P = _without_limits(model, state.q, u, J, P, limits)
+        u = P[0] @ asked
+        hindrance = hindrance if held is None else ""
+    bend = bend_along(J[0], P[0], u, twist)
+    plan, share = along(state, model, u, bend, twist, 1.0, hold, limits, held)
     missed = asked - J[0] @ u
     slowed = share < _SLOWED or float(missed @ missed) > (1.0 - _SLOWED) ** 2 * float(asked @ asked)
     if slowed and not hindrance and float(_nearness(J)[0]) < 1.0 / SLOW_FROM:
         hindrance = _singular(state.q, model)
     if plan is not None:
         return plan, (), hindrance
-    u = share * sliding_rates(J[0], asked, low, high)
+    low, high = rates_to_limits(state.q, limits)
+    u = np.clip(share * u, low, high)
     return *_by_rates(state, u, hold, limits, _together(state, u, limits)), hindrance
+
+
+def _without_limits(
+    model: RobotModel, q: Array, u: Array, J: Array, P: Array, limits: Limits
+) -> tuple[NDArray[np.bool_] | None, Array]:
+    """Which joints of a redundant arm stay at their limits while the others do what is asked, and their inverses.
+
+    None, and the inverses as they were, where the others can't.
+    """
+    low, high = rates_to_limits(q, limits)
+    held = (_SLOWED * u < low) | (_SLOWED * u > high)
+    of_others, near = inverses(model, q[None], J * ~held, held)
+    if held.sum() > len(u) - TASK or near[0] < 1.0 / SLOW_FROM:
+        return None, P
+    return held, of_others
 
 
 def _at_limit(q: Array, u: Array, limits: Limits, model: RobotModel) -> str:
@@ -955,12 +1132,15 @@ def _singular(q: Array, model: RobotModel) -> str:
     return f"near a singularity: jog joint {joint + 1}{way}, or move back"
 
 
-def _released(state: State, J: Array, hold: float, model: RobotModel, limits: Limits) -> tuple[Plan, Notes]:
+def _released(
+    state: State, J: Array, P: Array, hold: float, model: RobotModel, limits: Limits
+) -> tuple[Plan, Notes]:
     """Stop on the way that the tool is going."""
     u = state.qd
     if float((np.abs(u) / limits.qd_max).max()) >= STANDING:
         present = J @ u
-        plan, _ = along(state, model, u, Twist(present[:3], present[3:], False), 0.0, hold, limits)
+        twist = Twist(present[:3], present[3:], False)
+        plan, _ = along(state, model, u, bend_along(J, P, u, twist), twist, 0.0, hold, limits)
         if plan is not None:
             return plan, ()
     return _by_rates(state, np.zeros_like(u), hold, limits)
