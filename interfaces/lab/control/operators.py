@@ -34,6 +34,8 @@ STILL: Final = 0.02
 """What he sees move by less than this is at rest: as a share of a step."""
 SETTLED: Final = 0.3
 """It has to be at rest for so long [s]."""
+PATIENCE: Final = 5.0
+"""Where he has seen nothing move for so long, the step was lost or cut short, and he makes another [s]."""
 
 
 class Course:
@@ -145,6 +147,7 @@ class Stepper(Follower):
         self._moves: deque[tuple[float, Array]] = deque()
         self._aim: Array | None = None
         self._last: tuple[float, View] | None = None
+        self._until = 0.0
 
     @override
     def _chosen(self, seen: View, left: float) -> Array:
@@ -156,6 +159,7 @@ class Stepper(Follower):
             for lasting, what in self._hand.moves(seen, self._aim):
                 begin += lasting
                 self._moves.append((begin, what))
+            self._until = begin
         while self._moves and self._moves[0][0] <= now + 1e-9:
             self._moves.popleft()
         if self._moves:
@@ -165,7 +169,7 @@ class Stepper(Follower):
 
     def _done(self, seen: View, still: float) -> bool:
         """Whether he sees that the last step has been made, and the robot at rest, for so long [s]."""
-        if self._aim is None:
+        if self._aim is None or min(still, self._now - self._until) >= PATIENCE:
             return True
         left = float(np.linalg.norm(self._hand.place(seen) - self._aim))
         return left < DONE * self._hand.step and still >= SETTLED

@@ -90,6 +90,15 @@ def test_who_tracks_goes_on_and_who_waits_does_nothing_until_he_sees_what_came_o
     assert stepper.waited == pytest.approx(0.02 * np.count_nonzero(~moving[:-1]), rel=0.05)
 
 
+def test_who_waits_makes_another_step_where_one_was_lost() -> None:
+    stepper = Stepper(LINE, Point())
+    still = np.zeros(2)
+    told = [float(stepper.act(0.02 * k, still)[0]) for k in range(400)]
+    begun = np.flatnonzero(np.diff(np.array(told) != 0.0)) * 0.02
+    assert begun[1] - begun[0] == pytest.approx(5.0, abs=0.05)
+    assert not stepper.finished
+
+
 def test_a_base_turns_to_what_lies_aside_before_it_goes() -> None:
     hand = Wheels()
     seen = np.array([0.0, 0.0, 0.0])
