@@ -54,7 +54,7 @@ def study(
         out: Where the files go.
         seed: Of everything random.
         runs: Rooms in which accuracy is measured, goals among furniture and doors, or courses, 2 to 1000; 30, 100
-            or 5 if None.
+            or 10 if None.
         length: Of a drive in a room [s]; 60 if None.
         starts: From which a robot that knows nothing is found; 200 if None.
         operators: Who see the real robot in `CONTROL`; those that come with it if None.
@@ -133,7 +133,7 @@ def lab(
         int | None,
         option(
             "K",
-            "Seeds of each, courses of control, 5 unless given; rooms of localization, 30; goals of goals, 100.",
+            "Seeds of each, 5 unless given; courses of control, 10; rooms of localization, 30; goals, 100.",
             min=1,
             max=10_000,
         ),

@@ -61,7 +61,7 @@ CLAIMED: Final = {TRACKER: ("error",), WAITS: ("time",)}
 MOST: Final = {"time": 0.75, "error": 0.5}
 """Of an operator's figure who sees the real robot, at most."""
 SAID: Final = {"time": "time to the end", "error": "path error, mean,"}
-RUNS: Final = 5
+RUNS: Final = 10
 DRAWN: Final = "mon"
 LONGEST: Final = 120.0
 """Who isn't there by then has failed [s]."""
