@@ -42,6 +42,7 @@ def study(
     runs: int | None,
     length: float | None,
     starts: int | None,
+    operators: Sequence[str] | None,
     workers: int,
     *,
     as_json: bool,
@@ -53,14 +54,16 @@ def study(
         out: Where the files go.
         seed: Of everything random.
         runs: Rooms in which accuracy is measured, goals among furniture and doors, or courses, 2 to 1000; 30, 100
-            or 5 if None.
+            or 10 if None.
         length: Of a drive in a room [s]; 60 if None.
         starts: From which a robot that knows nothing is found; 200 if None.
+        operators: Who see the real robot in `CONTROL`; those that come with it if None.
         workers: Processes at once.
         as_json: Whether JSON goes to standard output, instead of tables.
     """
     from interfaces.lab import Study
     from interfaces.lab.control import study as views
+    from interfaces.lab.control.operators import OPERATORS
     from interfaces.lab.goals import study as trips
     from interfaces.lab.localization import study as rooms
     from interfaces.lab.output import to_json
@@ -70,7 +73,7 @@ def study(
         paper, write = trips.study_of(asked.runs), trips.write
     elif what == CONTROL:
         asked = Study(seed, views.RUNS if runs is None else runs)
-        paper, write = views.PAPER, views.write
+        paper, write = views.study_of(operators or tuple(OPERATORS)), views.write
     else:
         asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
         paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
@@ -118,7 +121,8 @@ def lab(
         option(
             "O",
             "figure-eight, corridor, slalom, docking, wander, mixed (unless given), inputs:FILE.csv, or "
-            "MODULE:NAME of your own; repeatable.",
+            "MODULE:NAME of your own; of control, tracker and move-and-wait (both unless given), or MODULE:NAME; "
+            "repeatable.",
         ),
     ] = None,
     position: Annotated[
@@ -129,7 +133,7 @@ def lab(
         int | None,
         option(
             "K",
-            "Seeds of each, courses of control, 5 unless given; rooms of localization, 30; goals of goals, 100.",
+            "Seeds of each, 5 unless given; courses of control, 10; rooms of localization, 30; goals, 100.",
             min=1,
             max=10_000,
         ),
@@ -156,13 +160,18 @@ def lab(
 
     if what:
         one_of("experiment", what, (LOCALIZATION, GOALS, CONTROL))
-        others = {
+        others: dict[str, object] = {
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
-            "--operator": operator, "--position": position, "--attribution": attribution, "--record": record,
+            "--position": position, "--attribution": attribution, "--record": record,
         }  # fmt: skip
-        driven = what == LOCALIZATION
-        refuse(what, others if driven else {**others, "--length": length, "--starts": starts})
-        study(what, out, seed, runs, length, starts, workers, as_json=as_json)
+        if what != LOCALIZATION:
+            others |= {"--length": length, "--starts": starts}
+        if what == CONTROL:
+            _once("operator", operator or ())
+        else:
+            others["--operator"] = operator
+        refuse(what, others)
+        study(what, out, seed, runs, length, starts, operator, workers, as_json=as_json)
         return
     refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0

@@ -89,6 +89,18 @@ def bootstrap(values: ArrayLike, seed: int, statistic: Callable[[Array], Array] 
     return clustered(sample[:, None], seed, statistic)
 
 
+def ratio(ours: ArrayLike, others: ArrayLike, seed: int) -> Estimate:
+    """A figure by another's, the geometric mean over runs, with its interval.
+
+    Args:
+        ours: A figure a run, (k,), above zero.
+        others: The other's of the same runs, (k,), above zero.
+        seed: Seed of the resampling.
+    """
+    found = bootstrap(np.log(ours) - np.log(others), seed)
+    return Estimate(math.exp(found.value), math.exp(found.low), math.exp(found.high), found.level)
+
+
 def clustered(values: ArrayLike, seed: int, statistic: Callable[[Array], Array] = _mean) -> Estimate:
     """A statistic of runs of which some share a seed, with its interval, from ten seeds on by resampling them.
 

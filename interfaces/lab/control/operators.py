@@ -12,12 +12,15 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import Final, TypeAlias
+from collections.abc import Callable
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 from typing_extensions import override
 
+from interfaces.system import checked, is_own, own
 from robots.onboard.driving import STAND, Drive, Posture
+from vrs.checks import one_of
 from vrs.mobile import wrapped
 from vrs.model import Array
 
@@ -31,6 +34,8 @@ STILL: Final = 0.02
 """What he sees move by less than this is at rest: as a share of a step."""
 SETTLED: Final = 0.3
 """It has to be at rest for so long [s]."""
+PATIENCE: Final = 5.0
+"""Where he has seen nothing move for so long, the step was lost or cut short, and he makes another [s]."""
 
 
 class Course:
@@ -85,8 +90,23 @@ class Hand(ABC):
         """Where it is seen."""
 
 
+class CourseOperator(Protocol):
+    """Who follows a course by what he sees."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether he has seen the robot at the course's end."""
+
+    @property
+    def waited(self) -> float:
+        """For how long he did nothing but wait [s]."""
+
+    def act(self, t: float, seen: View) -> Array:
+        """What he does from a time on [s], who sees this now: speeds as his `Hand` has them."""
+
+
 class Follower:
-    """Follows a course to its end."""
+    """Follows a course to its end without a pause."""
 
     def __init__(self, course: Course, hand: Hand) -> None:
         """Begin at the course's first point."""
@@ -127,6 +147,7 @@ class Stepper(Follower):
         self._moves: deque[tuple[float, Array]] = deque()
         self._aim: Array | None = None
         self._last: tuple[float, View] | None = None
+        self._until = 0.0
 
     @override
     def _chosen(self, seen: View, left: float) -> Array:
@@ -138,6 +159,7 @@ class Stepper(Follower):
             for lasting, what in self._hand.moves(seen, self._aim):
                 begin += lasting
                 self._moves.append((begin, what))
+            self._until = begin
         while self._moves and self._moves[0][0] <= now + 1e-9:
             self._moves.popleft()
         if self._moves:
@@ -147,7 +169,7 @@ class Stepper(Follower):
 
     def _done(self, seen: View, still: float) -> bool:
         """Whether he sees that the last step has been made, and the robot at rest, for so long [s]."""
-        if self._aim is None:
+        if self._aim is None or min(still, self._now - self._until) >= PATIENCE:
             return True
         left = float(np.linalg.norm(self._hand.place(seen) - self._aim))
         return left < DONE * self._hand.step and still >= SETTLED
@@ -195,9 +217,9 @@ class Wheels(Hand):
 class Tool(Hand):
     """An arm's tool: speed in proportion to how far it is from the point, or a straight line at one speed."""
 
-    step, ahead, rest = 0.06, 0.08, np.zeros(3)
-    gain: Final = 1.0
-    """Where the loop crosses over [1/s]: with 0.08 m of look-ahead the tool goes at 0.08 m/s."""
+    step, ahead, rest = 0.06, 0.032, np.zeros(3)
+    gain: Final = 2.5
+    """Where the loop crosses over [1/s]: with that look-ahead the tool goes at 0.08 m/s."""
 
     @override
     def place(self, seen: View) -> Array:
@@ -216,27 +238,53 @@ class Tool(Hand):
         return [(far / fast, way * (fast / far))]
 
 
+OPERATORS: Final[dict[str, Callable[[Course, Hand], CourseOperator]]] = {
+    "tracker": Follower,
+    "move-and-wait": Stepper,
+}
+"""By the names that the command line has."""
+
+
+def operator(name: str, course: Course, hand: Hand) -> CourseOperator:
+    """Make an operator, who begins at a course's first point.
+
+    Args:
+        name: One of `OPERATORS`, or `module:name` of one's own, which is called with the course and the hand.
+        course: What he's to follow.
+        hand: How the robot is moved.
+
+    Raises:
+        InvalidValueError: If there's none of that name, or it makes something else.
+        FormatError: If the module can't be imported.
+    """
+    if is_own(name):
+        made: CourseOperator = own("operator", name, ("course", "hand"))(course, hand)
+        checked("operator", name, made, ("act", "finished", "waited"))
+        return made
+    return OPERATORS[one_of("operator", name, OPERATORS, "or MODULE:NAME of your own")](course, hand)
+
+
 class Driver:
-    """A follower as a mobile robot's operator; see `interfaces.lab.driving.operators.Operator`."""
+    """One of them as a mobile robot's operator; see `interfaces.lab.driving.operators.Operator`."""
 
     room = ""
 
-    def __init__(self, follower: Follower, start: Posture, *, sees_real: bool) -> None:
+    def __init__(self, who: CourseOperator, start: Posture, *, sees_real: bool) -> None:
         """Let him begin.
 
         Args:
-            follower: Who drives.
+            who: Who drives.
             start: Where both robots begin.
             sees_real: Whether he sees the real robot, where it was reported last, instead of the virtual one.
         """
-        self.follower, self.start, self.sees_real = follower, start, sees_real
+        self.who, self.start, self.sees_real = who, start, sees_real
 
     @property
     def finished(self) -> bool:
         """Whether he's done."""
-        return self.follower.finished
+        return self.who.finished
 
     def drive(self, t: float, posture: Posture, _before: Drive) -> Drive:
         """See `Operator`."""
-        v, w = self.follower.act(t, np.array(posture)).tolist()
+        v, w = self.who.act(t, np.array(posture)).tolist()
         return Drive(v, w) if v or w else STAND

@@ -144,7 +144,7 @@ def _driven(
             # A stream's packet arrives in the end; a datagram that gets no time of arrival is lost.
             waiting += k < driving and (arrival is not None or case.transport is not Transport.DATAGRAMS)
         for arrived in link.forward.receive(now):
-            if arrived.sent < case.length:
+            if arrived.sent < driving * CONTROL:
                 waiting -= 1
                 delays.append((arrived.sent, arrived.arrived - arrived.sent))
                 largest = max(largest, arrived.arrived - arrived.sent)

@@ -15,7 +15,7 @@ from interfaces.lab.kim2006.following import Followed, FollowingCase, run
 from interfaces.lab.kim2006.packets import DUTY
 from interfaces.lab.kim2006.schemes import LOSS
 from interfaces.lab.output import BAD, GOOD, MUTED, REAL, VIRTUAL, draw, legend
-from interfaces.lab.statistics import Estimate, bootstrap
+from interfaces.lab.statistics import Estimate, bootstrap, ratio
 
 PROFILES: Final = ("none", "constant:0.1", "domain", "country", "mon", "tue", "wed", "thu", "fri", "lunar")
 LOSSES: Final = (0.0, 0.05, 0.1)
@@ -103,13 +103,9 @@ def conclude(study: Study, results: tuple[Any, ...]) -> Findings:
     return Findings(claims, (table, wins_table(found)), (_drawn(study), _errors(found)))
 
 
-def ratio(pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> Estimate | None:
-    """One scheme's path error by another's, the geometric mean over seeds; None where fewer than two have both."""
-    one, other = pairs
-    if len(one) < 2:
-        return None
-    found = bootstrap(np.log(one) - np.log(other), 0)
-    return Estimate(math.exp(found.value), math.exp(found.low), math.exp(found.high), found.level)
+def nearness(pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> Estimate | None:
+    """One scheme's path error by another's; None where fewer than two seeds have both."""
+    return ratio(*pairs, 0) if len(pairs[0]) >= 2 else None
 
 
 def compared(
@@ -120,7 +116,7 @@ def compared(
     text: str,
 ) -> Claim:
     """A claim on the ratio of path errors; it isn't shown where robots that are to be compared never moved."""
-    measured, other = ratio(pairs), ratio(without)
+    measured, other = nearness(pairs), nearness(without)
     if measured is None:
         return Claim(text, SOURCE, f"≤ {1 - EQUAL:g}", "the other's robots never moved", met=True)
     return claim(measured, None if other is None else (what, other))

@@ -137,9 +137,9 @@ def claim(
         f"{within[1]:g} s"
     )
     without = Counterfactual(
-        LABELS[NetworkControl.UNSCHEDULED], rival.value, rival.value >= LEAST_SHARE, rival.interval
+        LABELS[NetworkControl.UNSCHEDULED], rival.value, rival.high >= LEAST_SHARE, rival.interval
     )
-    met = shares.value >= LEAST_SHARE
+    met = shares.low >= LEAST_SHARE
     return Claim(text, SOURCE, f"{LEAST_SHARE:g} or more", shares.value, met, shares.interval, without)
 
 

@@ -1,41 +1,56 @@
-"""`vrs lab control`: who sees late is slower or strays, and nothing else differs between them."""
+"""`vrs lab control`: who sees late is slower or strays; without delay, or seeing late himself, nobody gains."""
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from interfaces.lab.claims import Study
+from interfaces.cli.main import app
+from interfaces.lab.claims import Results, Study, Verdict
 from interfaces.lab.control import study
-from interfaces.lab.control.operators import Course, Follower, Stepper, Tool, Wheels
-from interfaces.lab.control.study import CASES, TRACKER, TWIN, VIEWS, WAITS, conclude, drive, steer
+from interfaces.lab.control.operators import OPERATORS, Course, Driver, Follower, Stepper, Tool, Wheels
+from interfaces.lab.control.study import PROFILES, PROMPT, TRACKER, TWIN, WAITS, Runs, gain_claims, work
+from vrs.errors import InvalidValueError
 
 LINE = Course(np.column_stack((np.linspace(0.0, 1.0, 101), np.zeros(101))))
+SMALL = Study(runs=2)
+LATE = "thu"
 
 
-def seen(go: Any, delay: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    monkeypatch.setattr(study, "LONGEST", 30.0 if go is steer else 75.0)
-    monkeypatch.setattr(study, "network", lambda _: delay)
-    return {view: go(view, delay, 0) for view in VIEWS}
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = study.course
+    monkeypatch.setattr(study, "course", lambda *given: Course(whole(*given).points[:401]))
+    monkeypatch.setattr(study, "LONGEST", 40.0)
+    monkeypatch.setattr(study, "network", lambda profile: profile if profile == PROMPT else "constant:0.4")
 
 
-@pytest.mark.parametrize("go", [steer, drive])
-def test_with_delay_the_tracker_strays_and_who_waits_is_slower(go: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    late = seen(go, "constant:0.3", monkeypatch)
-    assert late[TWIN].done
-    assert late[WAITS].done
-    assert late[TRACKER].error > 2 * late[TWIN].error
-    assert late[WAITS].time > 1.3 * late[TWIN].time
-    assert late[WAITS].waited > late[TRACKER].waited == 0.0
+def claimed(robot: str, prompt: Runs, late: Runs) -> list[Verdict]:
+    """Verdicts on the path beside the tracker, and on the time beside who waits."""
+    found = {PROMPT: prompt, **dict.fromkeys(PROFILES, late)}
+    return [claim.verdict for claim in gain_claims(SMALL, robot, found, tuple(OPERATORS))[:2]]
 
 
-def test_who_sees_the_virtual_robot_does_the_same_whatever_the_delay(monkeypatch: pytest.MonkeyPatch) -> None:
-    prompt, late = (seen(steer, delay, monkeypatch)[TWIN] for delay in ("constant:0.02", "constant:0.3"))
-    assert late.error == pytest.approx(prompt.error, abs=1e-3)
-    # The real robot follows, so much later.
-    assert late.time - prompt.time == pytest.approx(0.28, abs=0.1)
+@pytest.mark.parametrize("robot", study.ROBOTS)
+def test_the_twin_gains_by_showing_at_once_what_is_seen_late(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if robot == "arm":
+        monkeypatch.setattr(study, "LONGEST", 20.0)
+    prompt, late = (work(SMALL, f"{robot}:{profile}", tuple(OPERATORS)) for profile in (PROMPT, LATE))
+    assert claimed(robot, prompt, late) == [Verdict.HOLDS] * 2
+    assert all(one.done for one in (*late[TWIN], *late[WAITS]))
+    assert [one.error for one in late[TWIN]] == pytest.approx([one.error for one in prompt[TWIN]], abs=1e-3)
+    assert all(one.waited > 2.0 for one in late[WAITS])
+    # Without delay nothing is gained, and where as much is gained without delay it isn't shown.
+    assert claimed(robot, prompt, prompt | {WAITS: prompt[TRACKER]}) == [Verdict.FAILS] * 2
+    assert claimed(robot, late | {TRACKER: late[WAITS]}, late)[1] is Verdict.NOT_SHOWN
+    # The mechanism off: who has the virtual robot is shown the real one, or drives that.
+    monkeypatch.setattr(study, "_leading", study._at_once)
+    monkeypatch.setattr(study, "Driver", lambda who, start, **_: Driver(who, start, sees_real=True))
+    blind = work(SMALL, f"{robot}:{LATE}", ())
+    assert claimed(robot, prompt, late | blind)[0] is Verdict.FAILS
 
 
 def along(follower: Follower, period: float, delay: float, speed: float = 1.0) -> tuple[list[float], list[float]]:
@@ -75,6 +90,15 @@ def test_who_tracks_goes_on_and_who_waits_does_nothing_until_he_sees_what_came_o
     assert stepper.waited == pytest.approx(0.02 * np.count_nonzero(~moving[:-1]), rel=0.05)
 
 
+def test_who_waits_makes_another_step_where_one_was_lost() -> None:
+    stepper = Stepper(LINE, Point())
+    still = np.zeros(2)
+    told = [float(stepper.act(0.02 * k, still)[0]) for k in range(400)]
+    begun = np.flatnonzero(np.diff(np.array(told) != 0.0)) * 0.02
+    assert begun[1] - begun[0] == pytest.approx(5.0, abs=0.05)
+    assert not stepper.finished
+
+
 def test_a_base_turns_to_what_lies_aside_before_it_goes() -> None:
     hand = Wheels()
     seen = np.array([0.0, 0.0, 0.0])
@@ -86,16 +110,28 @@ def test_a_base_turns_to_what_lies_aside_before_it_goes() -> None:
     assert ahead[0] * driving == pytest.approx(0.6)
 
 
-def result(time: float, error: float) -> Any:
-    track = np.zeros((2, 3))
-    return study.Results(done=True, time=time, error=error, largest=error, waited=0.0, track=track, line=track)
+def test_an_operator_of_ones_own_is_measured_and_a_wrong_name_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own_hand.py").write_text(
+        "from interfaces.lab.control.operators import Follower\n\nclass Slow(Follower):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    (part,) = study.study_of(("own_hand:Slow",)).parts
+    own, tracked = (study.steer(who, PROMPT, 0) for who in ("own_hand:Slow", TRACKER))
+    assert own.time == tracked.time
+    claims = part.conclude(SMALL, tuple(runs_of(case, (own,) * 2) for case in study.CASES)).claims
+    assert len(claims) == 2 * 2 * len(PROFILES)
+    for options, said in (
+        (("--operator", "nobody"), "move-and-wait"),
+        (("--operator", "tracker", "--operator", "tracker"), "once"),
+        (("--delay", "thu"), "--delay"),
+    ):
+        with pytest.raises(InvalidValueError, match=said):
+            CliRunner().invoke(app, ["lab", "control", "--out", str(tmp_path), *options], catch_exceptions=False)
 
 
-def test_the_twin_gains_where_its_figures_say_so() -> None:
-    good = {TWIN: (result(10, 0.01),) * 5, TRACKER: (result(9, 0.05),) * 5, WAITS: (result(30, 0.01),) * 5}
-    asked = Study(runs=5)
-    assert all(claim.holds for claim in conclude(asked, (good,) * len(CASES)).claims)
-    # Whoever sees the same as the rival gains nothing.
-    for rival in (TRACKER, WAITS):
-        off = conclude(asked, (good | {TWIN: good[rival]},) * len(CASES)).claims
-        assert not any(claim.holds for claim in off if claim.counterfactual and claim.counterfactual.what == rival)
+def runs_of(case: str, own: tuple[Results, ...]) -> Runs:
+    track = np.zeros((2, 3 if case.startswith("arm") else 2))
+    made = tuple(Results(**{**vars(one), "track": track, "line": track}) for one in own)
+    return {TWIN: made, "own_hand:Slow": made}

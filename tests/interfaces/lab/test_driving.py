@@ -127,6 +127,22 @@ def test_a_run_goes_on_for_the_largest_delay_and_five_seconds() -> None:
     assert drive.t[-1] == pytest.approx(18.0, abs=0.1)
 
 
+def test_who_is_done_before_the_end_ends_the_run() -> None:
+    class Brief:
+        """Drives ahead for a second."""
+
+        start, room, finished = Posture(0.0, 0.0, 0.0), "", False
+
+        def drive(self, t: float, _posture: Posture, _before: Drive) -> Drive:
+            self.finished = t >= 1.0
+            return Drive(0.1, 0.0)
+
+    made = run(
+        DriveCase("timeline", Transport.DATAGRAMS, "constant:0.2", "bare", length=20.0, reality=IDEAL), Brief()
+    )
+    assert 6.0 < made.t[-1] < 7.0
+
+
 def test_a_robot_that_stops_by_itself_ends_the_run_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
