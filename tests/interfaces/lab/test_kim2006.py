@@ -155,8 +155,8 @@ def test_rsp_is_equal_to_tcp_where_nothing_is_lost_if_it_is_not_where_something_
 
 
 def test_a_ratio_is_of_geometric_means() -> None:
-    assert links.ratio(((0.01, 0.04), (0.02, 0.02))) == pytest.approx((1.0, 0.5, 2.0, None))
-    assert links.ratio(((0.01,), (0.02,))) is None
+    assert links.nearness(((0.01, 0.04), (0.02, 0.02))) == pytest.approx((1.0, 0.5, 2.0, None))
+    assert links.nearness(((0.01,), (0.02,))) is None
 
 
 def planted(claims: tuple[Claim, ...], lacking: tuple[Claim, ...]) -> None:
