@@ -1,8 +1,8 @@
 """The audit log: who had control when, and what was refused, one JSON line each in a chain of hashes.
 
 A line's hash is that of the line's text and of the hash before it, so that no line is changed, left out or put in
-without breaking the chain. FILE.head beside it has the number and the hash of the last line, by which lines are missed
-that were cut off at the end. Who may write both files can write another chain: keep the last hash elsewhere.
+without breaking the chain. FILE.head beside it has the number and the hash of the last line, by which lines are
+missed that were cut off at the end. Who may write both files can write another chain: keep the last hash elsewhere.
 """
 
 from __future__ import annotations
