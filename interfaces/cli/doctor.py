@@ -142,6 +142,21 @@ class Check(NamedTuple):
     """What to do when it isn't ok."""
 
 
+def _check_log(path: Path, as_json: bool) -> None:
+    """Say whether a log's chain is whole, and its end's hash."""
+    from interfaces.stream.audit import check_audit
+
+    found = check_audit(path)
+    if as_json:
+        facts = {"lines": found.lines, "hash": found.hash, "problem": found.problem, "ok": not found.problem}
+        typer.echo(json.dumps({"schema": "vrs-audit/1", **facts}, indent=2, sort_keys=True))
+    else:
+        typer.echo(f"{path}: {found.problem or 'whole'}")
+        typer.echo(f"{found.lines} lines follow each other; the hash of the last one is {found.hash}")
+    if found.problem:
+        raise typer.Exit(1)
+
+
 CHECKS: Final = (
     Check("version", False, check_version, "install vrs-teleop in this environment"),
     Check("python", True, check_python, "install Python 3.11 or later and make the environment with it"),
@@ -162,9 +177,16 @@ CHECKS: Final = (
 
 
 def doctor(
+    log: Annotated[Path | None, option("FILE", "Check this audit log instead, line by line.")] = None,
     as_json: Annotated[bool, option("--json", "Write the checks as JSON on standard output.")] = False,
 ) -> None:
-    """Check this machine and say what to mend; exits 1 when something that the demo needs is missing."""
+    """Check this machine and say what to mend; exits 1 when something that the demo needs is missing.
+
+    With --log it exits 1 when a line of that log is changed, missing or cut, and says the first one.
+    """
+    if log is not None:
+        _check_log(log, as_json)
+        return
     found = [(check, *check.look()) for check in CHECKS]
     healthy = all(ok or not check.required for check, ok, _ in found)
     if as_json:

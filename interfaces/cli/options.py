@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import re
@@ -9,7 +10,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
+    from interfaces.stream.audit import AuditLog
     from interfaces.stream.certificates import Certificate
     from interfaces.val2.values import Dialect
     from robots.bullet.rooms import Room
@@ -142,6 +144,10 @@ TokenFile: TypeAlias = Annotated[
     Path | None, option("--token-file FILE", "Tokens; needed off loopback. Made if it's missing.")
 ]
 """What lets other machines in: see `access_for`."""
+Audit: TypeAlias = Annotated[
+    Path | None,
+    option("--audit FILE", "Append to it who has control and what is refused; vrs doctor --log checks it."),
+]
 Tls: TypeAlias = Annotated[
     bool | None,
     option(
@@ -238,7 +244,7 @@ OF_CAMERAS: Final = ("camera",)
 """The same of robots that pictures are made of."""
 OF_SITES: Final = (
     "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead",
-    "friction", "pose", "reports", "reached-as", "tls", "tls-cert", "tls-key",
+    "friction", "pose", "reports", "reached-as", "audit", "tls", "tls-cert", "tls-key",
 )  # fmt: skip
 """The same of robots that have a site, as thin clients haven't."""
 
@@ -440,6 +446,22 @@ def say_certificate(certificate: Certificate | None) -> None:
 def schemes(certificate: Certificate | None) -> tuple[str, str, str]:
     """What addresses of pages and of programs begin with, and what those of programs end with."""
     return ("http", "ws", "") if certificate is None else ("https", "wss", f"#sha256={certificate.fingerprint}")
+
+
+@contextlib.contextmanager
+def audit_log(path: Path | None) -> Iterator[AuditLog | None]:
+    """The audit log of a file meanwhile; None without one.
+
+    Raises:
+        FormatError: If it can't be written, or isn't one.
+    """
+    if path is None:
+        yield None
+        return
+    from interfaces.stream.audit import AuditLog
+
+    with contextlib.closing(AuditLog(path, failed=lambda said: typer.echo(f"vrs: {said}", err=True))) as log:
+        yield log
 
 
 def _is_any(host: str) -> bool:

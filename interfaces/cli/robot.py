@@ -16,6 +16,7 @@ from interfaces.cli.options import (
     OPERATOR_LOSS,
     ROOM,
     Architecture,
+    Audit,
     BodyName,
     Hosts,
     OperatorLossName,
@@ -30,6 +31,7 @@ from interfaces.cli.options import (
     TokenFile,
     access_for,
     asked_for,
+    audit_log,
     certificate_for,
     check_taken,
     end_on_signal,
@@ -196,6 +198,7 @@ def robot(
     tls: Tls = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
+    audit: Audit = None,
     until_eof: Annotated[
         bool, option("--until-eof", "End when standard input does, once the robot rests.")
     ] = False,
@@ -269,9 +272,12 @@ def robot(
 
     async def main() -> str:
         says = f"{made.name}, {kind}", remark
-        return await _serve(LiveRobot(made, access, server=software()), says, door, until_eof=until_eof)
+        robot = LiveRobot(made, access, server=software(), audit=log)
+        return await _serve(robot, says, door, until_eof=until_eof)
 
-    _end(run_loop(main()))
+    with audit_log(audit) as log:
+        problem = run_loop(main())
+    _end(problem)
 
 
 def _offset(text: str) -> float | None:

@@ -18,6 +18,7 @@ from interfaces.cli.options import (
     PROFILES,
     ROOM,
     Architecture,
+    Audit,
     BodyName,
     Host,
     Hosts,
@@ -35,6 +36,7 @@ from interfaces.cli.options import (
     abandon,
     access_for,
     asked_for,
+    audit_log,
     certificate_for,
     check_taken,
     class_access,
@@ -70,6 +72,7 @@ if TYPE_CHECKING:
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
+    from interfaces.stream.audit import AuditLog
     from interfaces.stream.certificates import Certificate
     from interfaces.stream.join import JoinPages
     from robots.bullet.rooms import Room
@@ -128,6 +131,7 @@ def serve(
     tls: Tls = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
+    audit: Audit = None,
     class_: Annotated[
         bool,
         option(
@@ -263,7 +267,8 @@ def serve(
             behind, architecture, folder,
         ))  # fmt: skip
     taught = _Class(own, reached_as[0] if reached_as else "", teacher) if class_ else None
-    run_loop(_serve(serving, access, host, port, allowed, taught, certificate, until_eof=until_eof))
+    with audit_log(audit) as log:
+        run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, until_eof=until_eof))
 
 
 def _site_url(text: str) -> str:
@@ -380,6 +385,7 @@ async def _serve(
     allowed: Hosts,
     taught: _Class | None,
     certificate: Certificate | None,
+    log: AuditLog | None,
     *,
     until_eof: bool,
 ) -> None:
@@ -426,7 +432,7 @@ async def _serve(
         from vrs.clock import WallClock
 
         clock = WallClock()
-        operators = [_operator(one, access, clock) for one in serving]
+        operators = [_operator(one, access, clock, log) for one in serving]
         if len(serving) > 1:
             await asyncio.to_thread(share_world, operators)
         first: list[BaseRoute] = []
@@ -505,7 +511,7 @@ async def _meet(serving: _Serving, operator: LiveOperator, robot: asyncio.Task[s
     say_robot(operator.robot.url, serving.conditions, serving.link_loss)
 
 
-def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
+def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | None) -> LiveOperator:
     """Make the operator's site."""
     from interfaces.jobs import JobFile
     from interfaces.media import CameraConfig
@@ -520,7 +526,7 @@ def _operator(serving: _Serving, access: Access, clock: Clock) -> LiveOperator:
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
     )  # fmt: skip
-    return LiveOperator(config, access, clock=clock)
+    return LiveOperator(config, access, clock=clock, audit=log)
 
 
 def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool) -> Station:

@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias
 import msgspec
 
 from interfaces.engine_server.site import Site, earliest
-from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Want, control
+from interfaces.messages import Ask, Broadcast, Follow, Order, Pulse, Refusal, Want, control
 from interfaces.messages.control import (
     PROTOCOL,
     Corrected,
@@ -39,6 +39,7 @@ from interfaces.messages.control import (
 )
 from interfaces.messages.jobs import RobotTask, TaskOrder, Tasks
 from interfaces.stream.access import Access
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
 from interfaces.stream.invitations import Membership, is_code
 from interfaces.stream.leasing import Classroom, LeasedRobot, Leasing, SessionState, Wish
@@ -266,18 +267,24 @@ class HubSession:
             if isinstance(answer, control.Lease):
                 self._lease = self.hub.leasing.version
             if answer is not None:
-                self.outbox.put(answer)
+                self._answer(seat, message, answer)
         elif isinstance(message, Who):
             self._say_who(message, now)
         elif isinstance(message, Survey | Impair):
             self._survey(seat, message, now)
         elif isinstance(message, TaskOrder):
-            self.outbox.put(self.hub.task(seat, message, now))
+            self._answer(seat, message, self.hub.task(seat, message, now))
         elif isinstance(message, PathCorrection):
             if (corrected := self.hub.correct(seat, message, now)) is not None:
-                self.outbox.put(corrected)
+                self._answer(seat, message, corrected)
         elif isinstance(message, Corrected | Problem):
             self.hub.corrected(seat, message)
+
+    def _answer(self, seat: SessionState, asked: Value, answer: Value) -> None:
+        """Answer what a client asks; what is refused is noted, but for a beat: one may come after the end."""
+        if isinstance(answer, Problem) and not isinstance(asked, control.Beat):
+            self.hub.note_refused(seat, str(asked.__struct_config__.tag), answer.text)
+        self.outbox.put(answer)
 
     def _say_who(self, message: Who, now: float) -> None:
         """Tell who is here, and from now on when that changes."""
@@ -299,11 +306,12 @@ class HubSession:
             self.outbox.put(found)
         else:
             text = "no way to a robot is emulated here"
-            self.outbox.put(problem or Problem(ProblemCode.NOT_ALLOWED, text, message.number))
+            self._answer(seat, message, problem or Problem(ProblemCode.NOT_ALLOWED, text, message.number))
 
     def _greet(self, hello: control.Hello, now: float) -> None:
         found = self.hub.greet(self, hello, now)
         if isinstance(found, Problem):
+            self.hub.note_stranger(self, hello, found.text)
             later = found.code in {ProblemCode.FULL, ProblemCode.TOO_FAST}
             self.close(TRY_AGAIN if later else POLICY, found.code, found.text)
             return
@@ -324,6 +332,7 @@ class HubSession:
                 self._wanted.add(message)
         elif not may_send(seat.role, message.sender):
             text = "a viewer commands nothing"
+            self.hub.note_refused(seat, "order", text)
             self._complain(Problem(ProblemCode.NOT_ALLOWED, text, message.number), now)
             return
         seat.servlet.receive(message, now=self.hub.engine_time(now))
@@ -445,6 +454,7 @@ class Hub:
         config: HubConfig | None = None,
         emulation: Emulation | None = None,
         workers: Workers | None = None,
+        audit: AuditLog | None = None,
         random_bytes: Callable[[int], bytes] = secrets.token_bytes,
     ) -> None:
         """Serve nobody yet.
@@ -457,6 +467,7 @@ class Hub:
             config: How to serve.
             emulation: The way to the robot, where one is emulated.
             workers: What lets the robot do something by itself, where it can.
+            audit: Where who has control is written, and what is refused; nowhere unless given.
             random_bytes: So many bytes that nobody can guess, to name sessions.
         """
         self.config = HubConfig() if config is None else config
@@ -465,7 +476,8 @@ class Hub:
         """What all clients get is written once."""
         self.site, self.access = site, access
         classroom = None if access.invitations is None else Classroom()
-        self.leasing = Leasing(lease, robot, self.limits.sharers, classroom)
+        self._audit = audit
+        self.leasing = Leasing(lease, robot, self.limits.sharers, classroom, note=self._note)
         """Who may command."""
         self.present = Present()
         """Who is here of a class, as its clients are told."""
@@ -503,6 +515,30 @@ class Hub:
         self._edit = site.look()
         self._sweep = -math.inf
         self._now = self._t = -math.inf
+
+    def _note(self, event: str, seat: SessionState | None, **facts: str) -> None:
+        if self._audit is not None:
+            self._audit.note(event, robot=self.site.robot, **self._who(seat), **facts)
+
+    def note_stranger(self, session: HubSession, hello: control.Hello, why: str) -> None:
+        """Note that a client wasn't let in."""
+        if self._audit is not None:
+            address = self._opened.get(session, "")
+            self._audit.refused(
+                robot=self.site.robot, what="hello", why=why, who=hello.name, role=hello.role.value, address=address
+            )
+
+    def note_refused(self, seat: SessionState, what: str, why: str) -> None:
+        """Note that a session was refused something."""
+        if self._audit is not None:
+            self._audit.refused(robot=self.site.robot, what=what, why=why, **self._who(seat))
+
+    def _who(self, seat: SessionState | None) -> dict[str, str]:
+        if seat is None:
+            return {}
+        session = self._served.get(seat)
+        address = "" if session is None else self._opened.get(session, "")
+        return {"who": seat.name, "role": seat.role.value, "address": address}
 
     @property
     def sessions(self) -> tuple[HubSession, ...]:
@@ -612,6 +648,8 @@ class Hub:
         """Make the frames that are due at now [s]; the sessions whose `advance` is to be called."""
         self._now, self._sweep = now, now + SWEEP
         self._t = self.site.time(now)
+        if self._audit is not None:
+            self._audit.advance()
         self.leasing.turn(now)
         self.site.advance(now=now)
         if self._shown is not None and now >= self._state_due:
@@ -708,8 +746,14 @@ class Hub:
     def _seat(self, name: str, role: Role, *, local: bool = False) -> SessionState:
         key = base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode("ascii")
         seat = SessionState(key, name, role, local=local)
-        seat.servlet = self.site.servlet(admit=lambda order: self.leasing.refusal(seat, order, self._now))
+        seat.servlet = self.site.servlet(admit=lambda order: self._refusal(seat, order))
         return seat
+
+    def _refusal(self, seat: SessionState, order: Order) -> Refusal | None:
+        refusal = self.leasing.refusal(seat, order, self._now)
+        if refusal is not None:
+            self.note_refused(seat, "order", refusal.text)
+        return refusal
 
     def _welcome(self, seat: SessionState, resumed: bool, now: float) -> Welcomed:
         config = self.config

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import math
 import unicodedata
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, Protocol, TypeAlias
 
 from interfaces.messages import Order, Refusal, RefusalCode, control
@@ -211,7 +212,15 @@ def _withdraw(room: Classroom, seat: SessionState, wish: Withdraw) -> str:
 class Leasing:
     """The lease of one robot, and the sessions that have it, share it, or wait for it."""
 
-    def __init__(self, lease: Lease, robot: LeasedRobot, sharers: int, classroom: Classroom | None = None) -> None:
+    def __init__(
+        self,
+        lease: Lease,
+        robot: LeasedRobot,
+        sharers: int,
+        classroom: Classroom | None = None,
+        *,
+        note: Callable[..., None] = lambda *_, **_facts: None,
+    ) -> None:
         """Nobody has it yet.
 
         Args:
@@ -219,8 +228,11 @@ class Leasing:
             robot: What the lease does to the robot.
             sharers: Sessions that may share it, at most.
             classroom: Who queues for it; None where nobody does.
+            note: Is told when somebody gets the lease, shares it or asks for it by force, and when it ends: what,
+                which session if it's known, and other facts by name.
         """
         self.lease, self._robot, self._sharers, self.classroom = lease, robot, sharers, classroom
+        self._note = note
         self.version = 0
         """Counts the changes of the lease."""
         self.holder: SessionState | None = None
@@ -265,6 +277,7 @@ class Leasing:
         self.holder = seat
         if seat is not None and self.classroom is not None:
             self.classroom.withdraw(seat)
+        self._note("control", seat, epoch=str(grant.epoch))
         self._robot.began(grant, now=now)
 
     def refusal(self, seat: SessionState, order: Order, now: float) -> Refusal | None:
@@ -361,6 +374,7 @@ class Leasing:
             return f"{taker.name} is a viewer, who can't have control"
         if taker is not self.holder:
             room.put_first(taker)
+            self._note("gives control", seat, to=taker.name)
             self.lease.revoke(admin=True, now=now)
             self._taker = None
         return ""
@@ -398,6 +412,7 @@ class Leasing:
             self._begin(seat, answer, now)
         else:
             self._taker = seat
+            self._note("takes over", seat)
         return None
 
     def _share(self, seat: SessionState, wish: control.Share, now: float) -> control.Lease | Problem:
@@ -412,6 +427,7 @@ class Leasing:
             if seat not in self._shares and len(self._shares) >= self._sharers:
                 return Problem(ProblemCode.LEASE, f"{self._sharers} share it already", wish.number)
             self._shares[seat] = True
+            self._note("shares control", seat, of=holder.name)
             self.version += 1
         return self.seen_by(seat, wish.number)
 
@@ -433,6 +449,7 @@ class Leasing:
             self.lease.heard(epoch, now=now)
         ended = self.lease.advance(now=now)
         if ended is not None:
+            self._note("control ended", self.holder, epoch=str(ended.epoch), why=ended.why.value)
             self.holder, self._ended = None, ended.why
             self._shares.clear()
             self.version += 1

@@ -30,6 +30,7 @@ from interfaces.runtime.physics import PhysicsConfig
 from interfaces.runtime.physics_messages import Grips
 from interfaces.stream import sockets
 from interfaces.stream.access import OPEN, Access, hosts
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.certificates import Certificate
 from interfaces.stream.server import application
 from interfaces.teleop import JointReference, RobotHostConfig, RobotSiteConfig
@@ -76,14 +77,19 @@ class Rows:
 
 @contextlib.asynccontextmanager
 async def robot_here(
-    *, site: RobotSiteConfig | None = None, body: str = IDEAL, port: int = 0, tls: SSLContext | None = None
+    *,
+    site: RobotSiteConfig | None = None,
+    body: str = IDEAL,
+    port: int = 0,
+    tls: SSLContext | None = None,
+    audit: AuditLog | None = None,
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
     made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
-    robot = LiveRobot(made, Access(free={Role.SITE}))
+    robot = LiveRobot(made, Access(free={Role.SITE}), audit=audit)
     app = application(robot.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running():
         await robot.ready()

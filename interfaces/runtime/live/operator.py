@@ -28,6 +28,7 @@ from interfaces.runtime.live.robot_client import GONE, RobotClient
 from interfaces.runtime.live.task_desk import TaskDesk
 from interfaces.runtime.live.twins import ArmTwins
 from interfaces.stream.access import Access
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.certificates import Certificate
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
@@ -94,13 +95,21 @@ class LiveOperatorConfig:
 class LiveOperator(LeasedRobot, Workers):
     """The virtual robot and all that joins it to people and to the real one. Enter `running` in its loop."""
 
-    def __init__(self, config: LiveOperatorConfig, access: Access, *, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        config: LiveOperatorConfig,
+        access: Access,
+        *,
+        clock: Clock | None = None,
+        audit: AuditLog | None = None,
+    ) -> None:
         """Session time begins here, unless another robot's site began it.
 
         Args:
             config: The site.
             access: Who may do what.
             clock: Session time, where several sites share it.
+            audit: Where it's written who has control, and what is refused; nowhere unless given.
 
         Raises:
             RecordingError: If it's to be recorded and the file can't be made.
@@ -131,7 +140,9 @@ class LiveOperator(LeasedRobot, Workers):
         hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         workers = self if which.is_base else None
-        self.hub = Hub(twins.site, lease, access, self, config=hub, emulation=self.emulation, workers=workers)
+        self.hub = Hub(
+            twins.site, lease, access, self, config=hub, emulation=self.emulation, workers=workers, audit=audit
+        )
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
         self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
         self.recording = SiteRecording(

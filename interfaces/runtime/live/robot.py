@@ -17,6 +17,7 @@ from starlette.routing import BaseRoute, Route
 from interfaces.messages.control import PROTOCOL, Attached, Role
 from interfaces.runtime.live.robot_server import RobotServer
 from interfaces.stream.access import Access, bearer
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Value
 from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
@@ -87,21 +88,25 @@ class LiveBody(ABC):
 class LiveRobot:
     """A robot that follows whoever says hello as an operator's site. Enter `running` where its loop runs."""
 
-    def __init__(self, body: LiveBody, access: Access, *, server: str = "vrs") -> None:
+    def __init__(
+        self, body: LiveBody, access: Access, *, server: str = "vrs", audit: AuditLog | None = None
+    ) -> None:
         """Stand, and wait for an operator.
 
         Args:
             body: What follows.
             access: Who may come in as `Role.SITE`.
             server: Name and version of the program.
+            audit: Where it's written whom it follows, and who is refused; nowhere unless given.
         """
         self.body, self.clock, self.host = body, body.clock, body.host
         self._access, self._program = access, server
         self.instance = secrets.token_urlsafe(9)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
-            self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide
-        )
+            self.host, self.clock, access, attached=self._attached, met=self._follow, heard=self._decide,
+            audit=audit,
+        )  # fmt: skip
         self.ended = asyncio.Event()
         """Set when the robot can't go on; anybody may set it to end it."""
         self.met: Callable[[Attached], None] = lambda _: None

@@ -14,6 +14,7 @@ from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, ProtocolError, Role
 from interfaces.stream.access import Access
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.server import Endpoint
 from interfaces.stream.sockets import let_stay
@@ -69,6 +70,7 @@ class RobotServer:
         attached: Callable[[], Attached],
         met: Callable[[Attached], None],
         heard: Callable[[], None],
+        audit: AuditLog | None = None,
     ) -> None:
         """Serve a host.
 
@@ -79,7 +81,9 @@ class RobotServer:
             attached: What a site is told that is let in.
             met: Is given that when one has been.
             heard: Called when a message comes that the host is given.
+            audit: Where it's written who is followed, and who is refused; nowhere unless given.
         """
+        self._audit = audit
         self._host, self._clock, self._access = host, clock, access
         self._attached, self._met, self._heard = attached, met, heard
         self._coming: Any = host.orders | Pong
@@ -109,6 +113,7 @@ class RobotServer:
     async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a connection that was accepted, until it ends."""
         connection = _OperatorConnection(encoding)
+        address = str((scope.get("client") or ("",))[0])
         writer = asyncio.create_task(self._write(connection, send))
         try:
             try:
@@ -118,7 +123,10 @@ class RobotServer:
                 refusal = Problem(ProblemCode.HELLO_LATE, f"no hello within {HELLO:g} s", fatal=True)
             if refusal is None:
                 let_stay(scope, known=True)
+                self._note("followed", address)
             else:
+                if self._audit is not None:
+                    self._audit.refused(what="hello", why=refusal.text, role=Role.SITE.value, address=address)
                 connection.send(refusal)
                 connection.end(_POLICY if refusal.code is not ProblemCode.FULL else _NO_ROOM, refusal.text)
             while connection.close is None and (message := await receive())["type"] != "websocket.disconnect":
@@ -128,6 +136,11 @@ class RobotServer:
             writer.cancel()
             if self._connection is connection:
                 self._connection = None
+                self._note("left", address)
+
+    def _note(self, event: str, address: str) -> None:
+        if self._audit is not None:
+            self._audit.note(event, role=Role.SITE.value, address=address)
 
     def _greet(self, connection: _OperatorConnection, message: Any) -> Problem | None:
         """Take the first message; why it can't be, or None if the operator is followed from now on."""

@@ -41,7 +41,7 @@ class Robot:
 
 
 def make_hub(
-    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, **options
+    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, audit=None, **options
 ) -> Hub:
     site = Site(Engine(MODEL, q=HOME, clock=ManualClock(now)))
     robot = Robot(stops)
@@ -54,6 +54,7 @@ def make_hub(
         robot,
         config=HubConfig(instance="one", server="test", **options),
         emulation=emulation,
+        audit=audit,
         random_bytes=lambda n: next(counter).to_bytes(n, "big"),
     )
     robot.hub = hub
