@@ -19,6 +19,8 @@ from websockets.typing import Subprotocol
 
 from interfaces import connect
 from interfaces.cli.main import exit_status
+from interfaces.messages.control import Role
+from interfaces.stream.access import add_person, end_person
 from interfaces.stream.audit import FIRST, LINES_BURST, AuditLog, check_audit, head_of
 from interfaces.stream.client_socket import UnreachableError
 from tests.interfaces import live_rig
@@ -113,6 +115,29 @@ def test_doctor_says_a_whole_log_and_its_last_hash(path: Path, capsys: pytest.Ca
     assert exit_status(["doctor", "--log", str(path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["lines"] == 8
     assert exit_status(["doctor", "--log", str(path.parent / "none")]) == 2
+
+
+def test_a_person_is_named_and_cut_off_when_the_token_ends(tmp_path: Path) -> None:
+    path, tokens = tmp_path / "audit.jsonl", tmp_path / "tokens"
+    token = add_person(tokens, "ada", Role.OPERATOR, "2090-01-31")
+    log = AuditLog(path)
+    with served(audit=log, people=tokens) as serving:
+        url = f"ws://127.0.0.1:{serving.port}/ws"
+        with connect(url, token=token, name="Ada's page") as robot:
+            assert robot.acquire().yours
+            end_person(tokens, "ada")
+            assert robot.wait(lambda robot: not robot.is_connected, 10.0)
+            with pytest.raises(UnreachableError, match="this token isn't one for the role operator"):
+                connect(url, token=token)
+            _until(lambda: serving.hub.robot.log[-1] == ("ended", 1, "expired"))
+    log.close()
+    told = [(one["event"], one.get("person"), one.get("why")) for one in facts(path)[1:-1]]
+    assert told == [
+        ("control", "ada", None),
+        ("refused", "ada", "this token has ended: ask for another one"),
+        ("refused", None, "this token isn't one for the role operator"),
+        ("control ended", "ada", "expired"),
+    ]
 
 
 def test_a_file_that_is_no_log_isnt_written_to(tmp_path: Path) -> None:
