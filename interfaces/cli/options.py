@@ -364,7 +364,8 @@ def class_access(host: str, token_file: Path | None) -> tuple[Access, str | None
     if tokens is not None and Role.ADMIN not in tokens:
         raise InvalidValueError("token-file", str(token_file), "a file with the token of an admin, who teaches")
     made = make_token() if tokens is None else None
-    return Access({Role.ADMIN: made} if made else tokens, free=(), invitations=Invitations(0.0)), made
+    given = {Role.ADMIN: made} if made else tokens
+    return Access(given, free=(), invitations=Invitations(0.0), people=token_file), made
 
 
 def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> Access:
@@ -382,7 +383,7 @@ def access_for(host: str, token_file: Path | None, *, free: Iterable[Role]) -> A
     from interfaces.stream.access import Access
 
     tokens = tokens_for(host, token_file)
-    return Access(free=free) if tokens is None else Access(tokens, free=())
+    return Access(free=free) if tokens is None else Access(tokens, free=(), people=token_file)
 
 
 def certificate_for(

@@ -47,6 +47,11 @@ class RawFile(Protocol):
         """Close the file."""
 
 
+def _owners(name: str, flags: int) -> int:
+    """Open a file that nobody but its owner may read, where it's made."""
+    return os.open(name, flags, 0o600)
+
+
 class Sink:
     """Writes all of its input, in order; after the first failure nothing more.
 
@@ -68,13 +73,14 @@ class Sink:
 
     @classmethod
     def create(cls, path: Path, *, over: bool = True) -> Sink:
-        """Make a file, or take the place of an old one where that's allowed.
+        """Make a file, mode 0600, or take the place of an old one where that's allowed, whose mode it keeps.
 
         Raises:
             RecordingError: If that can't be done.
         """
         try:
-            return cls(path.open("wb" if over else "xb", buffering=0), str(path))
+            made = open(path, "wb" if over else "xb", buffering=0, opener=_owners)  # noqa: SIM115
+            return cls(made, str(path))
         except FileExistsError:
             raise RecordingError(str(path), "it's there already: none is written over") from None
         except OSError as error:

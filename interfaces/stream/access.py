@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import base64
+import calendar
+import contextlib
 import hashlib
 import hmac
 import os
+import re
 import secrets
 import stat
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 from interfaces.link.proxy import Address
 from interfaces.messages.control import Role, covers
 from interfaces.stream.invitations import Invitations
-from interfaces.system import PLAIN_READ
+from interfaces.system import PLAIN_READ, write_whole, written
+from vrs.clock import seconds_since_1970, utc
 from vrs.errors import FormatError, InvalidValueError
 
 TOKEN_BYTES = 32
@@ -23,12 +29,34 @@ SHORTEST_TOKEN = -(-8 * TOKEN_BYTES // 6)
 """Shortest token [characters]: `TOKEN_BYTES` in base64, six bits a character, without padding."""
 LONGEST_TOKEN = 256
 """Longest token that is looked at [characters]."""
-LARGEST_FILE = 4096
+ENDED = "this token has ended: ask for another one"
+LARGEST_FILE = 65536
 """Largest token file [bytes]."""
+_PERSON: Final = re.compile(r"[\w.-]{1,40}")
+"""What people are called."""
+_HASHED: Final = re.compile(r"sha256:[0-9a-f]{64}")
 
 _LENGTHS = f"{SHORTEST_TOKEN} to {LONGEST_TOKEN} characters"
 OPEN = frozenset({Role.VIEWER, Role.OPERATOR})
 """Roles that need no token on a loopback address, as long as there is no token file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """Whose token it is; of the token a file has the digest alone."""
+
+    name: str
+    """Of 1 to 40 letters, digits, `.`, `_` and `-`."""
+    role: Role
+    digest: bytes = field(repr=False)
+    """SHA-256 of the token."""
+    until: float
+    """When it ends [s since 1970]."""
+
+    @property
+    def counts(self) -> bool:
+        """Whether it hasn't ended."""
+        return seconds_since_1970() < self.until
 
 
 class Access:
@@ -43,6 +71,7 @@ class Access:
         *,
         free: Iterable[Role] = OPEN,
         invitations: Invitations | None = None,
+        people: Path | None = None,
     ) -> None:
         """Give each role its token.
 
@@ -50,8 +79,10 @@ class Access:
             tokens: Text by role; a role without a token is open only if `free` says so.
             free: Roles that need no token. With tokens for other machines this is empty.
             invitations: Codes by which a class comes in; None where there's no class.
+            people: A token file whose people's tokens count; it's read again when it has changed.
 
         Raises:
+            FormatError: If that file can't be used.
             InvalidValueError: If a token is shorter than 32 random bytes are, or the admin's role is free.
         """
         tokens = {} if tokens is None else tokens
@@ -63,6 +94,29 @@ class Access:
             raise InvalidValueError("free", "admin", "roles other than admin")
         self._digests = {Role(role): _digest(token) for role, token in tokens.items()}
         self.invitations = invitations
+        self._file, self._seen = people, (-1, -1)
+        self._people: tuple[Person, ...] = ()
+        if people is not None:
+            self._people, self._seen = read_people(people), _version(people)
+
+    @property
+    def people(self) -> tuple[Person, ...]:
+        """Those of the file, as it is now; as it was, while it can't be read."""
+        if self._file is not None:
+            with contextlib.suppress(FormatError, OSError):
+                if (version := _version(self._file)) != self._seen:
+                    self._people, self._seen = read_people(self._file), version
+        return self._people
+
+    def person(self, token: str | None) -> str:
+        """Whose token it is; empty where it's nobody's."""
+        shown = _digest("" if token is None else token[: LONGEST_TOKEN + 1])
+        found = [one.name for one in self.people if hmac.compare_digest(one.digest, shown)]
+        return found[0] if found else ""
+
+    def still(self, person: str, role: Role) -> bool:
+        """Whether somebody's token counts, and for a role."""
+        return any(one.name == person and one.counts and covers(one.role, role) for one in self.people)
 
     def __repr__(self) -> str:
         roles = ", ".join(sorted(self._digests))
@@ -87,19 +141,97 @@ class Access:
         for owner, digest in self._digests.items():
             same = hmac.compare_digest(digest, shown)
             entitled |= same and covers(owner, role)
+        ended = False
+        for one in self.people:
+            same = hmac.compare_digest(one.digest, shown)
+            entitled |= same and one.counts and covers(one.role, role)
+            ended |= same and not one.counts
         member = None if self.invitations is None else self.invitations.member(token)
         entitled |= member is not None and covers(member.role, role)
         if entitled or (token is None and role in self._free):
             return ""
+        if ended:
+            return ENDED
         return f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"
 
 
 def read_tokens(path: Path) -> dict[Role, str]:
-    """Read a token file: on each line a role and its token.
+    """Read a token file: the roles' tokens; see `read_people` for those of people.
 
     Raises:
         FormatError: If there's no such file, others may read it, or it holds anything else.
     """
+    return _read(path)[0]
+
+
+def read_people(path: Path) -> tuple[Person, ...]:
+    """Read the people of a token file; errors as of `read_tokens`."""
+    return _read(path)[1]
+
+
+def _version(path: Path) -> tuple[int, int]:
+    state = path.stat()
+    return state.st_mtime_ns, state.st_ino
+
+
+def add_person(path: Path, name: str, role: Role, until: str) -> str:
+    """Put somebody into a token file, which is made if it's missing; the token, which is kept nowhere.
+
+    Args:
+        path: The file.
+        name: Of 1 to 40 letters, digits, `.`, `_` and `-`; nobody there may have it.
+        role: What the person may do.
+        until: The last day on which the token counts, `2027-01-31`, by UTC.
+
+    Raises:
+        InvalidValueError: If name or day isn't one, or somebody has the name.
+        FormatError: If the file can't be used.
+    """
+    if not path.exists():
+        make_tokens(path)
+    if not _PERSON.fullmatch(name) or any(one.name == name for one in read_people(path)):
+        allowed = "1 to 40 letters, digits, '.', '_' and '-', and nobody's in the file"
+        raise InvalidValueError("name", name, allowed)
+    if _end_of(until) is None:
+        raise InvalidValueError("until", until, "a day, as 2027-01-31")
+    token = make_token()
+    line = f"{role} sha256:{_digest(token).hex()} {name} {until}\n"
+    _rewrite(path, lambda lines: [*lines, line])
+    return token
+
+
+def end_person(path: Path, name: str) -> None:
+    """Take somebody's token out of a file.
+
+    Raises:
+        InvalidValueError: If nobody has that name.
+        FormatError: If the file can't be used.
+    """
+    names = [one.name for one in read_people(path)]
+    if name not in names:
+        raise InvalidValueError("name", name, f"one of {', '.join(names) or 'nobody: the file has no people'}")
+    _rewrite(path, lambda lines: [line for line in lines if line.split()[2:3] != [name]])
+
+
+def _rewrite(path: Path, change: Callable[[list[str]], list[str]]) -> None:
+    lines = path.read_text("ascii").splitlines(keepends=True)
+    if lines and not lines[-1].endswith("\n"):
+        lines[-1] += "\n"
+    with written(path):
+        write_whole(path, "".join(change(lines)).encode("ascii"), mode=0o600)
+
+
+def _end_of(day: str) -> float | None:
+    """The end of a day by UTC [s since 1970]; None of what is none."""
+    found = re.fullmatch(r"(20[0-9]{2})-([0-9]{2})-([0-9]{2})", day)
+    with contextlib.suppress(ValueError):
+        if found is not None:
+            end = float(calendar.timegm((*map(int, found.groups()), 24, 0, 0)))
+            return end if f"{utc(end - 1.0):%Y-%m-%d}" == day else None
+    return None
+
+
+def _read(path: Path) -> tuple[dict[Role, str], tuple[Person, ...]]:
     where = f"token file {path}"
     try:
         descriptor = os.open(path, PLAIN_READ)
@@ -117,18 +249,30 @@ def read_tokens(path: Path) -> dict[Role, str]:
     if len(data) > LARGEST_FILE:
         raise FormatError(where, f"it's longer than {LARGEST_FILE} bytes")
     tokens: dict[Role, str] = {}
+    people: list[Person] = []
     for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
         words = line.split()
         if not words:
+            continue
+        if len(words) == 4:
+            people.append(_person(words, f"{where}, line {number}"))
             continue
         if len(words) != 2 or words[0] not in set(Role) or words[0] in tokens:
             raise FormatError(where, f"line {number} must hold a role and its token, each role once")
         if not _can_be_token(words[1]):
             raise FormatError(where, f"the token of line {number} must have {_LENGTHS}")
         tokens[Role(words[0])] = words[1]
-    if not tokens:
+    if not tokens and not people:
         raise FormatError(where, "it holds no token")
-    return tokens
+    return tokens, tuple(people)
+
+
+def _person(words: list[str], where: str) -> Person:
+    role, digest, name, day = words
+    until = _end_of(day)
+    if role not in set(Role) or not _HASHED.fullmatch(digest) or not _PERSON.fullmatch(name) or until is None:
+        raise FormatError(where, "it must hold a role, sha256: and a digest, a name, and a day as 2027-01-31")
+    return Person(name, Role(role), bytes.fromhex(digest.removeprefix("sha256:")), until)
 
 
 def make_token(random_bytes: Callable[[int], bytes] = secrets.token_bytes) -> str:

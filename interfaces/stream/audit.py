@@ -240,10 +240,13 @@ def _last_line(path: Path) -> tuple[bytes | None, bytes]:
 
 
 def _read_head(path: Path) -> tuple[int, str] | None:
-    with contextlib.suppress(OSError):
-        found = _HEAD.fullmatch(head_of(path).read_bytes())
-        return None if found is None else (int(found[1]), found[2].decode())
-    return None
+    """Number and hash of the last line; 0 while none has been written, None where there's no head."""
+    try:
+        data = head_of(path).read_bytes()
+    except OSError:
+        return None
+    found = _HEAD.fullmatch(data or f"{0:016d} {FIRST}\n".encode())
+    return None if found is None else (int(found[1]), found[2].decode())
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ from interfaces.messages.control import (
     may_send,
 )
 from interfaces.messages.jobs import RobotTask, TaskOrder, Tasks
-from interfaces.stream.access import Access
+from interfaces.stream.access import ENDED, Access
 from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
 from interfaces.stream.invitations import Membership, is_code
@@ -55,6 +55,8 @@ SWEEP = 0.02
 """Longest time between two looks at what the sessions have to send [s]."""
 MOST_HANDED_ON = 256
 """Corrections that are with the client whose program they're for, at most."""
+PEOPLE = 1.0
+"""So often it's looked whether somebody's token has ended [s]."""
 PRESENCE = 0.2
 """At most so often are clients told who is here [s]."""
 SURVEYED = 0.1
@@ -513,7 +515,7 @@ class Hub:
         self._served: dict[SessionState, HubSession] = {}
         """The sessions that have a connection, with it."""
         self._edit = site.look()
-        self._sweep = -math.inf
+        self._sweep = self._people_due = -math.inf
         self._now = self._t = -math.inf
 
     def _note(self, event: str, seat: SessionState | None, **facts: str) -> None:
@@ -538,7 +540,8 @@ class Hub:
             return {}
         session = self._served.get(seat)
         address = "" if session is None else self._opened.get(session, "")
-        return {"who": seat.name, "role": seat.role.value, "address": address}
+        person = {"person": seat.person} if seat.person else {}
+        return {"who": seat.name, **person, "role": seat.role.value, "address": address}
 
     @property
     def sessions(self) -> tuple[HubSession, ...]:
@@ -655,6 +658,9 @@ class Hub:
         if self._shown is not None and now >= self._state_due:
             self.tell(self._shown)
             self._shown, self._state_due = None, now + 1.0 / self.config.state_rate
+        if now >= self._people_due:
+            self._people_due = now + PEOPLE
+            self._end_people()
         self.note_present(now)
         edit, before = self.site.look(), self._edit
         self._edit = edit
@@ -664,6 +670,13 @@ class Hub:
         if len(self._seats) > len(self._sessions):
             self._tidy(now)
         return tuple(session for session in self._sessions if session.is_due(now))
+
+    def _end_people(self) -> None:
+        """Close the connections of people whose tokens have ended."""
+        for seat, session in self._served.items():
+            if seat.person and not self.access.still(seat.person, seat.role):
+                self.note_refused(seat, "token", ENDED)
+                session.close(POLICY, ProblemCode.REFUSED, ENDED)
 
     def note_present(self, now: float) -> None:
         """Note who is here of a class, where that has changed; not too often, however many ask."""
@@ -713,7 +726,7 @@ class Hub:
             before.seat = None
         if member is not None and self.access.invitations is not None:
             self.access.invitations.remember(seat.key, member)
-        seat.alters = hello.alters
+        seat.alters, seat.person = hello.alters, self.access.person(hello.token)
         self._served[seat] = session
         self.leasing.note(seat, here=True)
         return seat, self._welcome(seat, resumed, now)

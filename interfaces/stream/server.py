@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.frames import Opcode
 
 from interfaces.messages.control import Role
-from interfaces.stream.access import check_host, check_origin
+from interfaces.stream.access import Access, bearer, check_host, check_origin
 from interfaces.stream.codec import Encoding
 from interfaces.stream.hub import Hub, HubSession
 from interfaces.stream.sockets import BoundedWebSocket
@@ -271,7 +271,7 @@ class HubServer:
                     self.cut_off += 1
                     client.socket.abort()
 
-    async def _say_health(self, _request: Request) -> JSONResponse:
+    async def _say_health(self, request: Request) -> JSONResponse:
         hub = self.hub
         facts = {
             "ok": True,
@@ -283,7 +283,23 @@ class HubServer:
             "lease": hub.lease_state.value,
         }
         facts |= dict(self._health() if self._health is not None else {})
-        return JSONResponse(facts, 200 if facts["ok"] else 503)
+        return health(facts, bool(facts["ok"]), may_see(request, hub.access, Role.VIEWER))
+
+
+def may_see(request: Request, access: Access, role: Role) -> bool:
+    """Whether a request shows a token of a role, or needs none."""
+    return not access.refusal(role, bearer(request.headers.get("authorization", "")))
+
+
+def health(facts: Mapping[str, Any], ok: bool, known: bool) -> JSONResponse:
+    """What `/health` answers: everything to who is known, else whether all is well and no more.
+
+    Args:
+        facts: Everything, with `ok`.
+        ok: Whether all is well: else the status is 503.
+        known: Who asks has shown a token, or needs none.
+    """
+    return JSONResponse(dict(facts) if known else {"ok": facts["ok"]}, 200 if ok else 503)
 
 
 class Endpoint:

@@ -83,13 +83,14 @@ async def robot_here(
     port: int = 0,
     tls: SSLContext | None = None,
     audit: AuditLog | None = None,
+    access: Access | None = None,
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
     """A robot's site in this loop, and its URL."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
     made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
-    robot = LiveRobot(made, Access(free={Role.SITE}), audit=audit)
+    robot = LiveRobot(made, Access(free={Role.SITE}) if access is None else access, audit=audit)
     app = application(robot.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running():
         await robot.ready()

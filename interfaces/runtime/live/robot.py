@@ -16,9 +16,10 @@ from starlette.routing import BaseRoute, Route
 
 from interfaces.messages.control import PROTOCOL, Attached, Role
 from interfaces.runtime.live.robot_server import RobotServer
-from interfaces.stream.access import Access, bearer
+from interfaces.stream.access import Access
 from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Value
+from interfaces.stream.server import health, may_see
 from interfaces.teleop.connection import Host
 from interfaces.timer import Turning
 from robots.onboard.watchdog import WatchdogConfig
@@ -26,8 +27,6 @@ from robots.things import Scene
 from vrs.clock import WallClock
 from vrs.model import Array
 
-JOINTS = frozenset(("q", "qd", "q_ref", "qd_ref"))
-"""Of `/health`, what only an operator's site is told."""
 _REST = 2.0
 """Longest time to come to rest in the end [s]."""
 
@@ -188,7 +187,4 @@ class LiveRobot:
         }
 
     async def _say_health(self, request: Request) -> JSONResponse:
-        facts = self.health()
-        if self._access.refusal(Role.SITE, bearer(request.headers.get("authorization", ""))):
-            facts = {name: fact for name, fact in facts.items() if name not in JOINTS}
-        return JSONResponse(facts, 503 if self.body.problem else 200)
+        return health(self.health(), not self.body.problem, may_see(request, self._access, Role.SITE))

@@ -358,3 +358,16 @@ def test_a_full_file_system(tmp_path: Path) -> None:
         check_prefix(path, recorder)
     finally:
         subprocess.run(["umount", str(tmp_path)], check=True)
+
+
+def test_a_recording_is_its_owners(tmp_path):
+    path, kept = tmp_path / "new.mcap", tmp_path / "kept.mcap"
+    before = os.umask(0)
+    try:
+        Sink.create(path).close()
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == 0o600
+    kept.touch(0o640)
+    Sink.create(kept).close()
+    assert kept.stat().st_mode & 0o777 == 0o640

@@ -41,11 +41,20 @@ class Robot:
 
 
 def make_hub(
-    *, now: float = 0.0, stops: bool = True, epoch: int = 0, emulation=None, invitations=None, audit=None, **options
+    *,
+    now: float = 0.0,
+    stops: bool = True,
+    epoch: int = 0,
+    emulation=None,
+    invitations=None,
+    audit=None,
+    people=None,
+    **options,
 ) -> Hub:
     site = Site(Engine(MODEL, q=HOME, clock=ManualClock(now)))
     robot = Robot(stops)
-    access = Access({"admin": ADMIN}, free=OPEN if invitations is None else (), invitations=invitations)
+    free = OPEN if invitations is None and people is None else ()
+    access = Access({"admin": ADMIN}, free=free, invitations=invitations, people=people)
     counter = iter(range(1, 10**9))
     hub = Hub(
         site,

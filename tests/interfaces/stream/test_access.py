@@ -5,8 +5,20 @@ import stat
 
 import pytest
 
+from interfaces.cli.main import exit_status
 from interfaces.messages.control import Role
-from interfaces.stream.access import Access, bearer, check_host, check_origin, hosts, make_tokens, read_tokens
+from interfaces.stream.access import (
+    Access,
+    add_person,
+    bearer,
+    check_host,
+    check_origin,
+    end_person,
+    hosts,
+    make_tokens,
+    read_people,
+    read_tokens,
+)
 from vrs.errors import FormatError, InvalidValueError
 
 TOKENS = {Role.VIEWER: "v" * 43, Role.OPERATOR: "o" * 43, Role.ADMIN: "a" * 43, Role.SITE: "s" * 43}
@@ -119,6 +131,85 @@ def test_no_file_and_no_plain_file(tmp_path):
     for path in (tmp_path / "none", tmp_path):
         with pytest.raises(FormatError, match="token file"):
             read_tokens(path)
+
+
+def test_people_have_tokens_of_their_own_that_end(tmp_path, monkeypatch):
+    path = tmp_path / "tokens"
+    ada, bo = (
+        add_person(path, "ada", Role.OPERATOR, "2090-01-31"),
+        add_person(path, "bo", Role.VIEWER, "2090-02-01"),
+    )
+    access = Access(read_tokens(path), free=(), people=path)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert ada not in path.read_text()
+    assert not access.refusal(Role.OPERATOR, ada)
+    assert not access.refusal(Role.VIEWER, bo)
+    assert access.refusal(Role.OPERATOR, bo)
+    assert access.refusal(Role.ADMIN, ada)
+    assert (access.person(ada), access.person(bo), access.person("x" * 43), access.person(None)) == (
+        "ada",
+        "bo",
+        "",
+        "",
+    )
+    assert not access.refusal(Role.ADMIN, read_tokens(path)[Role.ADMIN])
+    end_of_january = 3789590400.0
+    monkeypatch.setattr("interfaces.stream.access.seconds_since_1970", lambda: end_of_january - 1.0)
+    assert not access.refusal(Role.OPERATOR, ada)
+    monkeypatch.setattr("interfaces.stream.access.seconds_since_1970", lambda: end_of_january)
+    assert access.refusal(Role.OPERATOR, ada) == "this token has ended: ask for another one"
+    assert not access.still("ada", Role.VIEWER)
+    assert access.still("bo", Role.VIEWER)
+    assert not access.still("bo", Role.OPERATOR)
+    end_person(path, "bo")
+    assert access.refusal(Role.VIEWER, bo)
+    assert [one.name for one in access.people] == ["ada"]
+    path.write_text("rubbish")
+    assert [one.name for one in access.people] == ["ada"]
+
+
+@pytest.mark.parametrize(
+    ("name", "day"),
+    [("a b", "2090-01-31"), ("", "2090-01-31"), ("ada", "2090-01-31"), ("bo", "2090-02-30"), ("bo", "soon")],
+)
+def test_nobody_else_gets_into_a_file(tmp_path, name, day):
+    path = tmp_path / "tokens"
+    add_person(path, "ada", Role.OPERATOR, "2090-01-31")
+    before = path.read_bytes()
+    with pytest.raises(InvalidValueError):
+        add_person(path, name, Role.VIEWER, day)
+    with pytest.raises(InvalidValueError, match="one of ada"):
+        end_person(path, "bo")
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "line", ["operator sha256:12 ada 2090-01-31", "king sha256:" + 64 * "0" + " ada 2090-01-31",
+             "viewer sha256:" + 64 * "0" + " ada 2090-13-01", "viewer sha256:" + 64 * "0" + " a/b 2090-01-01"],
+)  # fmt: skip
+def test_a_person_that_is_none_is_refused_with_its_line(tmp_path, line):
+    path = tmp_path / "tokens"
+    make_tokens(path)
+    path.write_text(path.read_text() + line + "\n")
+    with pytest.raises(FormatError, match="line 5"):
+        read_people(path)
+
+
+def test_the_command_makes_lists_and_ends_tokens(tmp_path, capsys):
+    path = tmp_path / "tokens"
+    assert exit_status(["token", "make", str(path), "ada", "--role", "operator", "--days", "1"]) == 0
+    token = capsys.readouterr().out.strip()
+    assert not Access(free=(), people=path).refusal(Role.OPERATOR, token)
+    assert exit_status(["token", "list", str(path)]) == 0
+    assert capsys.readouterr().out.startswith("ada operator 20")
+    assert exit_status(["token", "end", str(path), "ada"]) == 0
+    assert Access(free=(), people=path).refusal(Role.OPERATOR, token)
+    for wrong in (
+        ["end", str(path), "ada"],
+        ["make", str(path), "bo", "--role", "king"],
+        ["list", str(tmp_path / "x")],
+    ):
+        assert exit_status(["token", *wrong]) == 2
 
 
 ALLOWED = hosts(["127.0.0.1", "localhost", "::1"], 8080)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import http.client
+import json
 import socket
 import ssl
 import time
@@ -17,8 +18,9 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from interfaces import connect
 from interfaces.cli.main import exit_status
 from interfaces.cli.options import certificate_for, names_of
+from interfaces.messages.control import Role
 from interfaces.stream import certificates
-from interfaces.stream.access import make_tokens
+from interfaces.stream.access import Access, make_tokens
 from interfaces.stream.certificates import Certificate, given_certificate, own_certificate, peer, server_url
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.sockets import SocketLimits
@@ -135,6 +137,8 @@ def test_old_versions_and_weak_suites_are_refused(shown: Certificate) -> None:
             "TLSv1.2 ECDHE-ECDSA-AES256-GCM-SHA384",
             "TLSv1.2 ECDHE-ECDSA-CHACHA20-POLY1305",
         ]
+        # It has taken all that came before, too.
+        assert shaken(serving.port, willing()).startswith("TLSv1.3 ")
 
 
 @pytest.mark.parametrize("known", ["sha256", "ca"])
@@ -289,6 +293,26 @@ def test_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
         finally:
             for one in idle:
                 one.close()
+
+
+def test_a_robots_health_is_told_to_sites() -> None:
+    token = "s" * 43
+
+    def asked(port: int, headers: dict[str, str]) -> dict[str, object]:
+        line = http.client.HTTPConnection("127.0.0.1", port, timeout=5.0)
+        line.request("GET", "/health", headers=headers)
+        found: dict[str, object] = json.load(line.getresponse())
+        line.close()
+        return found
+
+    async def main() -> None:
+        async with live_rig.robot_here(access=Access({Role.SITE: token}, free=())) as (_, url):
+            port = int(url.rsplit(":", 1)[1].split("/")[0])
+            assert await asyncio.to_thread(asked, port, {}) == {"ok": True}
+            known = await asyncio.to_thread(asked, port, {"Authorization": f"Bearer {token}"})
+            assert {"q", "robot", "operator"} <= set(known)
+
+    asyncio.run(main())
 
 
 def test_the_sites_know_each_other_by_certificates(shown: Certificate, other: Certificate, tmp_path: Path) -> None:

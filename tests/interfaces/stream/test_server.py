@@ -18,7 +18,8 @@ from interfaces.messages import Follow, ViewForm, control
 from interfaces.messages.control import Ping, Role
 from interfaces.stream.codec import LARGEST, Encoding, decode, encode
 from interfaces.stream.hub import HubSession
-from tests.interfaces.stream.served import served
+from interfaces.stream.invitations import Invitations
+from tests.interfaces.stream.served import ADMIN, served
 from tests.interfaces.stream.test_session import COMING
 
 PROTOCOLS = [str(encoding) for encoding in Encoding]
@@ -70,6 +71,16 @@ def test_both_encodings_health_and_frames():
         with urllib.request.urlopen(f"http://localhost:{serving.port}/health", timeout=5) as answer:
             health = json.load(answer)
         assert (health["ok"], health["robot"], health["lease"]) == (True, "puma560", "free")
+
+
+def test_without_a_token_health_says_whether_all_is_well_and_no_more():
+    with served(invitations=Invitations(0.0)) as serving:
+        request = urllib.request.Request(f"http://127.0.0.1:{serving.port}/health")
+        with urllib.request.urlopen(request, timeout=5) as answer:
+            assert json.load(answer) == {"ok": True}
+        request.add_header("Authorization", f"Bearer {ADMIN}")
+        with urllib.request.urlopen(request, timeout=5) as answer:
+            assert json.load(answer)["robot"] == "puma560"
 
 
 def test_other_hosts_other_pages_and_other_protocols_are_refused():
