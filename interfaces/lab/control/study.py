@@ -111,11 +111,13 @@ def steer(who: str, profile: str, seed: int) -> Results:
     line = course("arm", _rng(seed, 6))
     man = operator(TRACKER if who == TWIN else who, line, Tool())
     way = Conditions(delay=delay_profile(network(profile)), service=Service.DATAGRAM)
-    made = leading if who == TWIN else at_once
+    made = steer_virtual if who == TWIN else steer_real
     return measured("arm", line, *made(man, line, way, _rng(seed, 7)), man)
 
 
-def leading(man: CourseOperator, line: Course, way: Conditions, rng: np.random.Generator) -> tuple[Array, Array]:
+def steer_virtual(
+    man: CourseOperator, line: Course, way: Conditions, rng: np.random.Generator
+) -> tuple[Array, Array]:
     """Steer the virtual arm; where the real tool was, at times (k,) [s], (k, 3) [m]."""
     with exact_arm(HOME) as body:
         lab = twins(way, rng, body=body)
@@ -135,8 +137,8 @@ def leading(man: CourseOperator, line: Course, way: Conditions, rng: np.random.G
         return lab.t, tool(lab.reference.q)
 
 
-def at_once(man: CourseOperator, line: Course, way: Conditions, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Steer the real arm, which does what it's told as soon as it hears it; see `leading`."""
+def steer_real(man: CourseOperator, line: Course, way: Conditions, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Steer the real arm, which does what it's told as soon as it hears it; see `steer_virtual`."""
     there_rng, back_rng = rng.spawn(2)
     there, back = Channel[Array](way, there_rng), Channel[Array](way, back_rng)
     clock = ManualClock(0.0)

@@ -47,7 +47,7 @@ def test_the_twin_gains_by_showing_at_once_what_is_seen_late(robot: str, monkeyp
     assert claimed(robot, prompt, prompt | {WAITS: prompt[TRACKER]}) == [Verdict.FAILS] * 2
     assert claimed(robot, late | {TRACKER: late[WAITS]}, late)[1] is Verdict.NOT_SHOWN
     # The mechanism off: who has the virtual robot is shown the real one, or drives that.
-    monkeypatch.setattr(study, "leading", study.at_once)
+    monkeypatch.setattr(study, "steer_virtual", study.steer_real)
     monkeypatch.setattr(study, "Driver", lambda who, start, **_: Driver(who, start, sees_real=True))
     blind = work(SMALL, f"{robot}:{LATE}", ())
     assert claimed(robot, prompt, late | blind)[0] is Verdict.FAILS
