@@ -28,6 +28,7 @@ from interfaces.cli.options import (
     recorded_robot,
     say_certificate,
     schemes,
+    shown_host,
 )
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -229,7 +230,7 @@ def _serve(
         scheme, _, _ = schemes(certificate)
         async with sockets.serve(app, listening, tls=context), page.running():
             names = " and ".join(str(track.recording.path) for track in playback.tracks)
-            typer.echo(f"vrs: playing {names} on {scheme}://{Address(host, number)}/replay")
+            typer.echo(f"vrs: playing {names} on {scheme}://{Address(shown_host(host), number)}/replay")
             say_certificate(certificate)
             sys.stdout.flush()
             await ended.wait()

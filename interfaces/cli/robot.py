@@ -44,6 +44,7 @@ from interfaces.cli.options import (
     say_certificate,
     saying_policy,
     schemes,
+    shown_host,
     site_certificate,
     tokens_for,
 )
@@ -323,7 +324,7 @@ async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_
         keep_quiet()
         hasten(1)
         if not robot.ended.is_set():
-            here = Address(address.host, port)
+            here = Address(shown_host(address.host), port)
             _, scheme, known = schemes(certificate)
             typer.echo(f"{READY}{scheme}://{here}/site{known} ({kind})")
             say_certificate(certificate)

@@ -400,7 +400,7 @@ async def _serve(
     end_on_signal(ended)
     async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
         listening = stack.enter_context(contextlib.closing(sockets.bind(host, port)))
-        shown = Address(host, listening.getsockname()[1])
+        shown = Address(shown_host(host), listening.getsockname()[1])
         val_listening = None
         for one in serving:
             if one.val_port is not None:
