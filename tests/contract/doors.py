@@ -25,10 +25,12 @@ VRS = (sys.executable, "-c", "from interfaces.cli import main; main()")
 
 
 def environment(home: Path) -> dict[str, str]:
-    """What a command is run with: nothing of the user's but the search path."""
+    """What a command is run with: nothing of the user's but the search path, and what is hidden from tests."""
+    hidden = os.environ.get("VRS_WITHOUT", "")
     return {
         "PATH": os.environ["PATH"],
-        "PYTHONPATH": str(HOUSE),
+        "PYTHONPATH": os.pathsep.join([*([str(HOUSE / "tests" / "without")] if hidden else []), str(HOUSE)]),
+        "VRS_WITHOUT": hidden,
         "HOME": str(home),
         "LANG": "C.UTF-8",
         "TZ": "UTC",

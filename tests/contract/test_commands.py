@@ -12,7 +12,7 @@ from tests.contract.cases import ALL, COMMANDS
 
 def test_this_machine_computes_as_the_one_that_made_the_golden_results(exact: bool) -> None:
     if not exact:
-        pytest.skip("NumPy, BLAS or the C library rounds otherwise here: of results only the structure is compared")
+        pytest.skip("without PyBullet, or where NumPy or BLAS rounds otherwise, only the structure is compared")
 
 
 def test_there_is_a_golden_result_for_each_case_and_no_other(past: dict[str, Any]) -> None:

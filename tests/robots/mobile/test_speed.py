@@ -5,9 +5,12 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
+import pytest
+
 BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "mobile.py"
 
 
+@pytest.mark.needs("pybullet", "mujoco")
 def test_robots_run_many_times_faster_than_real_time() -> None:
     spec = importlib.util.spec_from_file_location("mobile_benchmark", BENCHMARK)
     assert spec is not None
