@@ -129,6 +129,8 @@ def stands_at(page: Page, place: tuple[float, float, float]) -> bool:
 
 @pytest.mark.slow
 def test_the_papers_scenario_is_listed_tried_and_done(page: Page, kept: Path) -> None:
+    if not page.get("station.session.holds"):
+        page.take_control()
     page.page.click("#theme")
     page.page.click("#tab-jobs")
     add(page, "wait", "key")
