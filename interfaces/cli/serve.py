@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractAsyncContextManager
 
     from interfaces.link import LinkConditions
+    from interfaces.link.proxy import Address
     from interfaces.recording.live import LiveRecording
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
@@ -201,7 +202,6 @@ def serve(
     else:
         policy, advice = None if robot_at is not None else LossPolicy.HALT, ""
     at = None if robot_at is None else _site_url(robot_at)
-    own = shown_host(host)
     allowed = asked_for(host, reached_as or ())
     token, theirs = None, None
     if robot_token_file is not None:
@@ -266,7 +266,7 @@ def serve(
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
             behind, architecture, folder,
         ))  # fmt: skip
-    taught = _Class(own, reached_as[0] if reached_as else "", teacher) if class_ else None
+    taught = _Class(reached_as[0] if reached_as else "", teacher) if class_ else None
     with audit_log(audit) as log:
         run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, until_eof=until_eof))
 
@@ -346,20 +346,17 @@ class _Serving:
 class _Class:
     """How a class comes in."""
 
-    host: str
-    """By which others of the network reach this machine."""
     reached_as: str
-    """By what they reach the server, where that's not by its own address; empty where it is."""
+    """By what others reach the server, where that's not by its own address; empty where it is."""
     teacher: str | None = field(repr=False)
     """The token that was made for the teacher; None where a file has one."""
 
-    def pages(self, access: Access, clock: Clock, port: int, scheme: str) -> JoinPages:
-        """What tells the codes, of a server that listens on a port by http or https."""
-        from interfaces.link.proxy import Address
+    def pages(self, access: Access, clock: Clock, at: Address, scheme: str) -> JoinPages:
+        """What tells the codes, of a server at an address by http or https."""
         from interfaces.stream.join import JoinPages
 
         assert access.invitations is not None
-        base = f"{scheme}://{self.reached_as or Address(self.host, port)}/"
+        base = f"{scheme}://{self.reached_as or at}/"
         return JoinPages(access.invitations, access, clock, base)
 
 
@@ -464,7 +461,7 @@ async def _serve(
                 first = routes
         page, ws, known = schemes(certificate)
         context = None if certificate is None else certificate.server_context()
-        joining = None if taught is None else taught.pages(access, clock, shown.port, page)
+        joining = None if taught is None else taught.pages(access, clock, shown, page)
         app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port))
         for part in (sockets.serve(app, listening, tls=context), *parts):
             await stack.enter_async_context(part)
