@@ -4,6 +4,9 @@ STAMP := .venv/.installed
 DEV_STAMP := .venv/.installed-dev
 DOCS_STAMP := .venv/.installed-docs
 BENCH_STAMP := .venv/.installed-bench
+# Each of the suite's hundreds of processes would compile three hundred modules where the environment keeps Python
+# from storing what it compiled.
+export PYTHONDONTWRITEBYTECODE :=
 PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .PHONY: demo test slow without contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
