@@ -40,6 +40,7 @@ class Stub:
         self.moved: list[tuple[str, tuple[float, ...]]] = []
         self.heard: list[bytes | None] = []
         self.happened: list[str] = []
+        self.remembered: list[tuple[str, bytes]] = []
         self.resting, self.range, self.steps = True, 1.234, 0
 
     def move(self, binding: str, values: tuple[float, ...]) -> None:
@@ -56,6 +57,10 @@ class Stub:
 
     def events(self) -> list[str]:
         found, self.happened = self.happened, []
+        return found
+
+    def memories(self) -> list[tuple[str, bytes]]:
+        found, self.remembered = self.remembered, []
         return found
 
     def go_on(self, steps: int = 1) -> None:
