@@ -1,4 +1,4 @@
-"""`vrs rsp`: robot models, the code that is generated from them, and a service of CUBO."""
+"""`vrs rsp`: robot models, the code that is generated from them, and a service."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def generate(
         typer.echo(f"Wrote {target}: {', '.join(files)}")
 
 
-@rsp.command(short_help="Let CUBO tell a story to whoever comes near")
+@rsp.command(short_help="Let a thin client tell a story to whoever comes near")
 def story(
     address: Annotated[str, argument("HOST:PORT", "Where vrs robot --rsp HOST:PORT --model story listens.")],
     text: Annotated[Path | None, option("--text FILE", "What is told instead, a sentence a line.")] = None,
@@ -110,12 +110,12 @@ def story(
     token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
     visits: Annotated[int, option("N", "End after so many visitors; 0 for never.", min=0)] = 0,
 ) -> None:
-    """Let CUBO tell a story whenever somebody comes near it, as its sensors say, until Ctrl-C."""
+    """Let a thin client tell a story whenever somebody comes near it, as its sensors say, until Ctrl-C."""
     from interfaces.rsp.live import opened
     from interfaces.rsp.model import read_model
     from interfaces.rsp.story import STORY, StoryTeller
     from interfaces.system import run_loop
-    from robots.cubo.parameters import STORY_FILE
+    from robots.robot import USUAL_CLIENT, ThinClient, load
     from vrs.checks import bounded_text
 
     told = (
@@ -123,14 +123,17 @@ def story(
     )
     if not told:
         raise InvalidValueError("text", str(text), "a file with a sentence")
-    sound, problem = run_loop(_spoken(told))
+    client = load(USUAL_CLIENT).device(ThinClient)
+    assert client is not None
+    rate = client.sound_rate
+    sound, problem = run_loop(_spoken(told, rate))
     if problem:
         typer.echo(f"vrs: {problem}: the story is only written", err=True)
     if out is not None:
         with written(out):
             out.mkdir(parents=True, exist_ok=True)
-    with opened(read_model(STORY_FILE), address, key_file=token_file) as middleware:
-        teller = StoryTeller(middleware, sound)
+    with opened(read_model(client.model.with_name("story.xmi")), address, key_file=token_file) as middleware:
+        teller = StoryTeller(middleware, sound, rate)
         typer.echo(f"vrs: waiting for somebody to come near {address}")
         try:
             _tell(teller, middleware, told, out, visits)
@@ -168,22 +171,22 @@ def _write_heard(teller: StoryTeller, path: Path) -> None:
     """Write what the microphone heard of late, as WAV."""
     import wave
 
-    from robots.cubo.body import HEARING_RATE
+    from robots.mobile.microphone import TOLD_RATE
 
     with written(path), path.open("wb") as raw, wave.open(raw, "wb") as file:
         file.setnchannels(1)
         file.setsampwidth(2)
-        file.setframerate(HEARING_RATE)
+        file.setframerate(TOLD_RATE)
         file.writeframes(b"".join(piece.tobytes() for piece in tuple(teller.heard)))
 
 
-async def _spoken(sentences: Sequence[str]) -> tuple[bytes, str]:
-    """Sentences as the robot's speaker plays them; without the program nothing, and why."""
+async def _spoken(sentences: Sequence[str], rate: int) -> tuple[bytes, str]:
+    """Sentences as a speaker plays them that wants a rate [1/s]; without the program nothing, and why."""
     from interfaces.media.speech import SpeechError, cleaned, spoken
     from interfaces.rsp.story import playable
 
     try:
-        return b"".join([playable(*await spoken(cleaned(sentence))) for sentence in sentences]), ""
+        return b"".join([playable(*await spoken(cleaned(sentence)), rate) for sentence in sentences]), ""
     except SpeechError as error:
         return b"", str(error)
 

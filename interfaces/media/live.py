@@ -157,9 +157,9 @@ class LiveMedia:
         return next((camera.problem for camera in self.cameras.values() if camera.problem), "")
 
     def _level(self) -> int | None:
-        """How loud it is at the robot, in whole dB; None in silence."""
+        """How loud it is at the robot, in whole dB; None below what people hear."""
         level = self.microphone.level(self.clock.now()) if self.microphone.hears else -math.inf
-        return None if level == -math.inf else round(level)
+        return round(level) if level >= 0.0 else None
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""

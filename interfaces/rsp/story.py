@@ -1,4 +1,4 @@
-"""A service of the thin client CUBO: when somebody comes near it, it takes a picture and tells a story.
+"""A service of a thin client: when somebody comes near it, it takes a picture and tells a story.
 
 The robot has no brain: the service runs at the local system, and knows what the robot's sensors say.
 
@@ -26,7 +26,7 @@ from interfaces.rsp.devices import (
 from interfaces.rsp.errors import DeadlineError
 from interfaces.rsp.host import FRAGMENT_TIME
 from interfaces.rsp.middleware import Middleware
-from robots.cubo.body import HEARD_MODULUS, SOUND_RATE
+from robots.mobile.microphone import TOLD_MODULUS
 from vrs.model import Array
 
 STORY: Final = (
@@ -106,27 +106,28 @@ class Hearing:
     def take(self, values: Sequence[int]) -> NDArray[np.int16]:
         """Return the samples of what the sensor says that are new, (m,)."""
         count, told = values[0], np.array(values[1:], dtype=np.int16)
-        new = len(told) if self._count is None else (count - self._count) % HEARD_MODULUS
+        new = len(told) if self._count is None else (count - self._count) % TOLD_MODULUS
         self._count = count
         lost = np.zeros(max(new - len(told), 0), dtype=np.int16)
         return np.concatenate([lost, told[len(told) - min(new, len(told)) :]])
 
 
 class StoryTeller:
-    """The service, on a robot whose model has the devices of `robots/cubo/story.xmi`; call `turn` now and then."""
+    """The service, on a robot whose model has the devices of `story.xmi`; call `turn` now and then."""
 
-    def __init__(self, middleware: Middleware, sound: bytes) -> None:
+    def __init__(self, middleware: Middleware, sound: bytes, rate: int) -> None:
         """Look and listen from now on.
 
         Args:
             middleware: Of the robot.
-            sound: The story, 16 bits a sample, `SOUND_RATE`; empty where nothing can speak.
+            sound: The story as the speaker plays it, 16 bits a sample; empty where nothing can speak.
+            rate: Samples a second of it.
         """
         self.proximity = SensorDevice[int](middleware, "proximity")
         self.position = SensorDevice[int](middleware, "position")
         self._speaker, self._lip = StreamDevice(middleware, "speaker"), EffectorDevice[int](middleware, "lip")
         self._look = CommandDevice[int](middleware, "look")
-        self._sound, self._loudness = sound, _loudness(sound)
+        self._sound, self._loudness = sound, _loudness(sound, rate)
         self._visitors, self._hearing = Visitors(), Hearing()
         self.pictures: deque[bytes] = deque(maxlen=16)
         """JPEGs of who came, that nobody has taken yet."""
@@ -171,16 +172,16 @@ class StoryTeller:
         return ranges[sensor], bearing
 
 
-def _loudness(sound: bytes) -> list[int]:
+def _loudness(sound: bytes, rate: int) -> list[int]:
     """How far the lip is open during each fragment, 0 to 255."""
     samples = np.frombuffer(sound, dtype="<i2", count=len(sound) // 2).astype(np.float64)
-    size = round(SOUND_RATE * FRAGMENT_TIME)
+    size = round(rate * FRAGMENT_TIME)
     padded = np.concatenate([samples, np.zeros(-len(samples) % size)]).reshape(-1, size)
     level = np.sqrt((padded**2).mean(axis=1)) if len(padded) else np.zeros(0)
     return [round(255.0 * part / max(float(level.max()), 1.0)) for part in level.tolist()]
 
 
-def playable(samples: NDArray[np.int16], rate: int) -> bytes:
-    """Samples of any rate [1/s], (k,), as the speaker plays them."""
-    times = np.arange(math.ceil(len(samples) * SOUND_RATE / rate)) * rate / SOUND_RATE
+def playable(samples: NDArray[np.int16], rate: int, wanted: int) -> bytes:
+    """Samples of any rate [1/s], (k,), as a speaker plays them that wants another one [1/s]."""
+    times = np.arange(math.ceil(len(samples) * wanted / rate)) * rate / wanted
     return np.interp(times, np.arange(len(samples)), samples).astype("<i2").tobytes()

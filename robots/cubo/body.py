@@ -16,13 +16,13 @@ from robots.cubo.shapes import EYE
 from robots.mobile.body import MobileBody
 from robots.mobile.camera import Lens, Look, Sight, jpeg
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
-from robots.mobile.microphone import Microphone, samples_of
+from robots.mobile.microphone import TOLD, TOLD_MODULUS, TOLD_RATE, Microphone, samples_of
 from robots.mobile.position import FusedPosition, TruePosition
 from robots.rooms import Room
 from robots.simulated import USUAL_WORLD
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
-from vrs.mobile import clipped
+from vrs.mobile import DriveLimits, clipped
 
 Values = tuple[float, ...]
 BUTTONS: Final = ("service", "message")
@@ -36,20 +36,13 @@ MEASURES: Final = (
 )  # fmt: skip
 """Bindings of sensors: (x, y, θ) [m, m, rad]; counts right, left; distances [m], 8 around from straight ahead, the
 reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds right, left [m/s]; angles [rad]; how
-many samples were heard, modulo `HEARD_MODULUS`, and the newest `HEARD` of them."""
+many samples were heard, modulo `TOLD_MODULUS`, and the newest `TOLD` of them."""
 COMMANDS: Final = ("ir", "say", "stop", "look")
 """Bindings of commands: the infrared remote control sends a code, a phrase is said, arms, head and wheels stop, a
 picture is taken, of which `memories` tells."""
-SOUND_RATE: Final = 48_800
-"""Samples a second of what the speaker plays, 16 bits each, little endian: 1952 bytes in 20 ms. Chosen."""
-HEARING_RATE: Final = 8_000
-"""Samples a second of the microphone, of 16 bits. Chosen."""
-HEARD: Final = 320
-"""Samples that the microphone tells at once: each is told twice at 20 ms, so a lost packet takes none along."""
-HEARD_MODULUS: Final = 32_768
 LENS: Final = Lens(width=160, height=120)
 """Of its small camera. Chosen."""
-_FRAGMENT: Final = HEARING_RATE // 50
+_FRAGMENT: Final = TOLD_RATE // 50
 """Samples of the microphone while a fragment is played."""
 _LOUD: Final = 0.25
 """Share of its own voice that the microphone gets."""
@@ -69,6 +62,7 @@ class CuboBody(MobileBody):
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
+        limits: DriveLimits = p.LIMITS,
         senses: Senses | None = None,
         exact: bool = False,
     ) -> None:
@@ -80,6 +74,7 @@ class CuboBody(MobileBody):
             room: A room, or the name of one that comes with the package; only a floor, unless given.
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
+            limits: How fast it may drive.
             senses: What it senses with; proximity, unless given, and what tells it where it is.
             exact: Whether it knows its posture exactly, instead of by odometry and an overhead camera.
 
@@ -101,11 +96,11 @@ class CuboBody(MobileBody):
         self._sight: Sight | None = None
         self._voice: deque[bytes] = deque([b""], maxlen=4)
         self._voiced = np.zeros(0)
-        self._heard: NDArray[np.int16] = np.zeros(HEARD, dtype=np.int16)
+        self._heard: NDArray[np.int16] = np.zeros(TOLD, dtype=np.int16)
         self._heard_until = 0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
         super().__init__(
-            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses
+            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=limits, senses=senses
         )
         self._ear, self._ear_at = Microphone(self.room, EYE.neck[2]), (*self.truth[:2], self.time)
         self._position = TruePosition(self) if exact else FusedPosition(self)
@@ -194,7 +189,7 @@ class CuboBody(MobileBody):
                 return right.speed * p.WHEEL_RADIUS, left.speed * p.WHEEL_RADIUS
             case "microphone":
                 self._listen()
-                return float(self._heard_until % HEARD_MODULUS), *self._heard.tolist()
+                return float(self._heard_until % TOLD_MODULUS), *self._heard.tolist()
         return (self.angles()[_LIMBS[binding]],) if binding in _LIMBS else None
 
     def events(self) -> list[str]:
@@ -237,17 +232,17 @@ class CuboBody(MobileBody):
 
     def _listen(self) -> None:
         """Hear the room and its own voice, from when it listened last."""
-        until, place = int(self.time * HEARING_RATE + 0.5), (*self.truth[:2], self.time)
-        count = min(until - self._heard_until, HEARD)
+        until, place = int(self.time * TOLD_RATE + 0.5), (*self.truth[:2], self.time)
+        count = min(until - self._heard_until, TOLD)
         if count <= 0:
             return
         while len(self._voiced) < count and self._voice:
             self._voiced = np.concatenate([self._voiced, _as_heard(self._voice.popleft())])
         own, self._voiced = self._voiced[:count], self._voiced[count:]
-        times = np.arange(until - count + 1, until + 1) / HEARING_RATE
+        times = np.arange(until - count + 1, until + 1) / TOLD_RATE
         heard = samples_of(self._ear.hear(self._ear_at, place, times)).astype(np.float64)
         heard[: len(own)] += _LOUD * own
-        self._heard = np.concatenate([self._heard, np.clip(heard, -32767, 32767).astype(np.int16)])[-HEARD:]
+        self._heard = np.concatenate([self._heard, np.clip(heard, -32767, 32767).astype(np.int16)])[-TOLD:]
         self._heard_until, self._ear_at = until, place
 
     def _swing(self, limb: Limb, number: int, values: Values) -> None:

@@ -17,8 +17,6 @@ from vrs.mobile import DriveLimits
 
 MODEL_FILE: Final = Path(__file__).with_name("cubo.xmi")
 """CUBO's robot model for RSP, XMI."""
-STORY_FILE: Final = MODEL_FILE.with_name("story.xmi")
-"""Another one, with camera and microphone, for the service of `vrs rsp story`."""
 LENGTH: Final = 0.200
 """Along x [m]."""
 WIDTH: Final = 0.218

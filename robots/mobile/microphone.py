@@ -30,6 +30,12 @@ DENSITY: Final = 250.0
 """Of walls and leaves [kg/m³], an assumption: boards on studs, so that 0.1 m has 25 kg/m²."""
 SWELL: Final = 1.0
 """A tone swells and fades so often [1/s], as a telephone's; its level is that of whole periods."""
+TOLD_RATE: Final = 8_000
+"""Samples a second of a thin client's microphone, of 16 bits. Chosen."""
+TOLD: Final = 320
+"""Samples that it tells at once: each is told twice at 20 ms, so a lost packet takes none along."""
+TOLD_MODULUS: Final = 32_768
+"""Before them it tells how many it has heard, modulo that."""
 FULL: Final = 85.0
 """Level of the sine that reaches the largest sample [dB]: speech at 1 m has 25 dB below that."""
 

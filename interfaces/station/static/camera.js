@@ -196,13 +196,13 @@ function Stage({ station, camera }) {
     <div class="row of-picture"><span class="rate" id="camera-rate" title="Pictures a second that arrive">
         ${per ? `${figure(per, 1)} pictures/s` : "no picture"}</span>
       <span class="muted" id="camera-angles">${facts && `${side(facts.pan, "left", "right")}, ${side(facts.tilt, "up", "down")}`}</span>
-      <span class="grow"></span><select id="camera-view" aria-label="Which camera" value=${view}
+      <span class="grow"></span>
+      ${toggle("camera-sound", !muted, muted ? "volume_off" : "volume_up", muted ? "Sound on" : "Sound off", byRtp, () => camera.listen())}</div>
+    <div class="row"><select id="camera-view" aria-label="Which camera" value=${view}
         onChange=${({ target }) => camera.choose({ view: target.value })}>
-        ${Object.entries(VIEWS).map(([name, [title]]) => html`<option value=${name}>${title}</option>`)}</select></div>
-    <div class="row of-sound"><span class="muted" id="camera-level" hidden=${!facts?.microphone}>
-        ${`At its microphone: ${facts?.level == null ? "silence" : `${facts.level} dB`}`}</span><span class="grow"></span>
-      ${toggle("camera-hear", hears && !muted, "mic", "Microphone", byRtp && facts.microphone, () => camera.hear())}
-      ${toggle("camera-sound", !muted, muted ? "volume_off" : "volume_up", muted ? "Sound on" : "Sound off", byRtp, () => camera.listen())}</div>`;
+        ${Object.entries(VIEWS).map(([name, [title]]) => html`<option value=${name}>${title}</option>`)}</select><span class="grow"></span>
+      <span class="muted" id="camera-level" hidden=${!facts?.microphone} title="At its microphone">${facts?.level == null ? "silent" : `${facts.level} dB`}</span>
+      ${toggle("camera-hear", hears && !muted, "mic", "Microphone", byRtp && facts.microphone, () => camera.hear())}</div>`;
 }
 
 /** What the robot's screen shows, over the 3D view. */

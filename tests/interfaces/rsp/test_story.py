@@ -20,18 +20,20 @@ from interfaces.rsp.middleware import Middleware
 from interfaces.rsp.model import read_model
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.story import Hearing, StoryTeller, Visitors, playable
-from robots.cubo.body import HEARING_RATE, MOVES, SOUND_RATE, CuboBody
-from robots.cubo.parameters import STORY_FILE
+from robots.cubo.body import MOVES, CuboBody
+from robots.cubo.parameters import MODEL_FILE
+from robots.mobile.microphone import TOLD_RATE
 from robots.rooms import Room, read_room
 from tests.interfaces.rsp.test_live import robot
 from vrs.clock import ManualClock
 
-MODEL = read_model(STORY_FILE)
+MODEL = read_model(MODEL_FILE.with_name("story.xmi"))
 ROOM = read_room(
     "room 1\nsize 6 6\nstart 3 3 0\nwall 2.5 2.6  3.5 2.6\nsound 3 5 level=70 pitch=1000\n"
     "person 0.2  0,5.5,3  6,5.5,3  9,3.6,3  14,3.6,3  17,5.5,3  21,5.5,3  24,3.6,3  30,3.6,3\n"
 )
 """A wall 0.4 m to its right from the beginning; somebody who comes before it from 8 s to 15 s, and from 23 s on."""
+SOUND_RATE = 48_800
 TIMES = np.arange(2 * SOUND_RATE) / SOUND_RATE
 STORY = (12_000 * np.sin(2 * np.pi * 300 * TIMES) * (1 + np.sin(2 * np.pi * 2 * TIMES)) / 2).astype("<i2")
 
@@ -44,7 +46,7 @@ class Told:
         core = LocalCore(MODEL, rng.randbytes)
         core.open(now=0.0)
         middleware = Middleware(core, clock)
-        self.teller = StoryTeller(middleware, STORY.tobytes())
+        self.teller = StoryTeller(middleware, STORY.tobytes(), SOUND_RATE)
         self.came: list[tuple[float, float, float]] = []
         self.lips: list[tuple[float, float]] = []
         answers: list[bytes] = []
@@ -102,15 +104,15 @@ def test_its_camera_takes_a_picture_of_who_came_and_its_lip_moves_while_it_tells
 def test_its_microphone_hears_the_room_and_its_own_story(told: Told) -> None:
     def share(piece: np.ndarray, pitch: float) -> float:
         """How much of a piece is a tone [samples, root mean square]."""
-        wave_of = np.exp(-2j * np.pi * pitch * np.arange(len(piece)) / HEARING_RATE)
+        wave_of = np.exp(-2j * np.pi * pitch * np.arange(len(piece)) / TOLD_RATE)
         return abs((piece * wave_of).mean()) * math.sqrt(2)
 
     def at(begin: float, end: float) -> np.ndarray:
-        return told.heard[round(begin * HEARING_RATE) : round(end * HEARING_RATE)].astype(float)
+        return told.heard[round(begin * TOLD_RATE) : round(end * TOLD_RATE)].astype(float)
 
     first = told.came[0][0]
     quiet, loud = at(2.0, 6.0), at(first + 0.2, first + 1.8)
-    assert len(told.heard) / HEARING_RATE == pytest.approx(26.0, abs=0.3)
+    assert len(told.heard) / TOLD_RATE == pytest.approx(26.0, abs=0.3)
     level = 20 * math.log10(math.sqrt((quiet**2).mean()) / 32767 * math.sqrt(2)) + 85.0
     assert level == pytest.approx(70 - 20 * math.log10(2.0), abs=0.3)
     assert share(loud, 300.0) > 100 * share(quiet, 300.0)
@@ -122,7 +124,7 @@ def test_where_packets_are_lost_nobody_is_told_it_twice_and_the_microphone_keeps
     lossy = Told(ROOM, 12.0, loss=0.15)
     assert [round(t) for t, *_ in lossy.came] == [9]
     assert len(lossy.teller.pictures) == 1
-    assert len(lossy.heard) / HEARING_RATE == pytest.approx(12.0, abs=0.5)
+    assert len(lossy.heard) / TOLD_RATE == pytest.approx(12.0, abs=0.5)
 
 
 def test_a_wall_is_nobody_and_a_robot_that_turns_towards_one_looks_anew() -> None:
@@ -150,13 +152,13 @@ def test_what_is_told_twice_is_heard_once_and_what_is_lost_is_silence() -> None:
 
 def test_a_story_of_any_rate_lasts_as_long_on_the_speaker() -> None:
     samples = (1000 * np.sin(2 * np.pi * 100 * np.arange(22_050) / 22_050)).astype(np.int16)
-    played = np.frombuffer(playable(samples, 22_050), dtype="<i2")
+    played = np.frombuffer(playable(samples, 22_050, SOUND_RATE), dtype="<i2")
     assert len(played) == SOUND_RATE
     assert np.abs(np.fft.rfft(played)).argmax() == 100
 
 
 @pytest.mark.needs("pybullet")
-@pytest.mark.parametrize("speaks", [True, False])
+@pytest.mark.parametrize("speaks", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_command_tells_it_and_says_so_where_nothing_speaks(
     tmp_path: Path, speaks: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -176,6 +178,6 @@ def test_the_command_tells_it_and_says_so_where_nothing_speaks(
     assert ("espeak-ng isn't installed: the story is only written" in said.err) is not speaks
     assert (tmp_path / "out" / "visit-1.jpg").read_bytes()[:2] == b"\xff\xd8"
     with wave.open(str(tmp_path / "out" / "heard.wav")) as file:
-        assert file.getframerate() == HEARING_RATE
+        assert file.getframerate() == TOLD_RATE
         heard = np.frombuffer(file.readframes(10**6), dtype="<i2")
     assert bool(np.abs(heard).max(initial=0) > 1000) is speaks
