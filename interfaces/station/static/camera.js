@@ -18,7 +18,7 @@ const BUTTONS = [
 ];
 /** What pictures are of, and what's said of them. */
 const VIEWS = {
-  robot: ["Robot's camera", "What the robot's camera sees"],
+  robot: ["Robot", "What the robot's camera sees"],
   overhead: ["Overhead", "The room from above"],
   both: ["Both", "What the robot's camera sees, and the room from above"],
 };
