@@ -13,6 +13,7 @@ The format is line by line, `docs/ipr.md` has all of it:
     door 2 2  2 3  hinged  0,0  10,0  12,1
     via 2.5 2.5
     place table 3 1.2 90
+    sound 5.8 0.4  level=62 pitch=440
 
 Lengths in metres, times in seconds, angles in degrees; `#` begins a comment. A thing is unknown if the operator's
 map doesn't have it; people and doors always are.
@@ -261,6 +262,24 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
+class Sound:
+    """A point from which a tone is heard; what a microphone gets of it is for `robots.mobile.microphone`."""
+
+    name: str
+    x: float
+    """[m]."""
+    y: float
+    """[m]."""
+    level: float
+    """Sound pressure level at 1 m, over whole seconds [dB, re 20 µPa]."""
+    pitch: float
+    """[Hz]."""
+    start: float = -math.inf
+    """It sounds in [start, end) [s]."""
+    end: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
 class Room:
     """What stands and walks on a rectangular floor, 0 ≤ x ≤ length, 0 ≤ y ≤ width."""
 
@@ -279,6 +298,8 @@ class Room:
     """Via points of the map [m]."""
     places: tuple[Place, ...] = ()
     """Named points of the map."""
+    sounds: tuple[Sound, ...] = ()
+    """What is heard in it."""
 
     @property
     def things(self) -> tuple[Block | Column, ...]:
@@ -349,6 +370,7 @@ class _Reader:
         self._doors: list[Door] = []
         self._via: list[tuple[float, float]] = []
         self._places: dict[str, Place] = {}
+        self._sounds: list[Sound] = []
         self._seen: set[str] = set()
         self._kinds: dict[str, Callable[[list[str]], None]] = {
             "name": self._read_name,
@@ -361,6 +383,7 @@ class _Reader:
             "door": self._read_door,
             "via": self._read_via,
             "place": self._read_named,
+            "sound": self._read_sound,
         }
 
     def read(self, text: str) -> Room:
@@ -402,11 +425,12 @@ class _Reader:
             tuple(self._doors),
             tuple(self._via),
             tuple(self._places.values()),
+            tuple(self._sounds),
         )
 
     def _count(self) -> int:
         things = len(self._blocks) + len(self._columns) + len(self._people) + len(self._doors)
-        return things + len(self._via) + len(self._places)
+        return things + len(self._via) + len(self._places) + len(self._sounds)
 
     def _fail(self, problem: str) -> None:
         raise FormatError(f"{self._where}, line {self._line}", problem)
@@ -565,6 +589,13 @@ class _Reader:
         if len(words) == 4:
             heading = math.radians(self._number("heading", words[3], -360.0, 360.0))
         self._places[name] = Place(name, *self._place(words[1:3]), heading)
+
+    def _read_sound(self, words: list[str]) -> None:
+        options = {"level": (0.0, 130.0, 60.0), "pitch": (50.0, 8000.0, 440.0), **_TIMES}
+        at, option, _ = self._split(words, 2, "x, y [m]", options, set())
+        start, end = self._times(option)
+        name = f"sound in line {self._line}"
+        self._sounds.append(Sound(name, *self._place(at), option["level"], option["pitch"], start, end))
 
     def _timetable(self, points: list[str], count: int, who: str, what: str) -> list[tuple[float, list[str]]]:
         """Times and the words at each, of points such as t,x,y."""

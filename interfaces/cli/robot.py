@@ -77,7 +77,7 @@ def thin_client(
         name: What `robots.load` finds it by.
         body: What is real of it; the usual one if empty.
         address: Where it listens for RSP, HOST:PORT.
-        model: Of its devices; its own unless given.
+        model: Of its devices, a file, or the name of one that comes with it; its own unless given.
         room: Where it drives.
         token_file: Keys; needed off loopback, made if it's missing.
         until_eof: Whether it ends with standard input.
@@ -95,7 +95,9 @@ def thin_client(
     device = client.device(ThinClient)
     if device is None:
         raise InvalidValueError("robot", name, f"a thin client with --rsp, as {USUAL_CLIENT} is")
-    make, robot = client.body(body), read_model(device.model if model is None else model)
+    own = device.model if model is None else device.model.parent / f"{model}.xmi"
+    chosen = model if model is not None and (model.exists() or not own.exists()) else own
+    make, robot = client.body(body), read_model(chosen)
     tokens = tokens_for(where.host, token_file)
     keys = None if tokens is None else keys_of(tokens, token_file)
     sock = bind(where.host, where.port)
@@ -160,7 +162,8 @@ def robot(
         str | None, option("HOST:PORT", "Be a thin client instead, that is driven by RSP over UDP here.")
     ] = None,
     rsp_model: Annotated[
-        Path | None, option("--model FILE.xmi", "With --rsp: another robot model than its own.")
+        Path | None,
+        option("--model FILE.xmi|NAME", "With --rsp: another robot model; story, with camera and microphone."),
     ] = None,
     listen: Annotated[
         str, option("HOST:PORT", "Where an operator's site connects; port 0 for any.")

@@ -1,4 +1,4 @@
-"""`vrs rsp`: robot models, and the code that is generated from them."""
+"""`vrs rsp`: robot models, the code that is generated from them, and a service."""
 
 from __future__ import annotations
 
@@ -9,10 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from interfaces.cli.options import argument, option
+from interfaces.rsp.errors import NoSessionError
 from interfaces.system import written
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from interfaces.rsp.middleware import Middleware
     from interfaces.rsp.model import Element, RobotModel
+    from interfaces.rsp.story import StoryTeller
 
 rsp = typer.Typer(name="rsp", rich_markup_mode=None)
 model = typer.Typer(name="model", rich_markup_mode=None)
@@ -92,6 +98,97 @@ def generate(
         typer.echo(json.dumps({"package": str(target), "files": files}, indent=2))
     else:
         typer.echo(f"Wrote {target}: {', '.join(files)}")
+
+
+@rsp.command(short_help="Let a thin client tell a story to whoever comes near")
+def story(
+    address: Annotated[str, argument("HOST:PORT", "Where vrs robot --rsp HOST:PORT --model story listens.")],
+    text: Annotated[Path | None, option("--text FILE", "What is told instead, a sentence a line.")] = None,
+    out: Annotated[
+        Path | None, option("DIR", "Where pictures of who came go, and what was heard: visit-N.jpg, heard.wav.")
+    ] = None,
+    token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
+    visits: Annotated[int, option("N", "End after so many visitors; 0 for never.", min=0)] = 0,
+) -> None:
+    """Let a thin client tell a story whenever somebody comes near it, as its sensors say, until Ctrl-C."""
+    from interfaces.rsp.live import opened
+    from interfaces.rsp.model import read_model
+    from interfaces.rsp.story import STORY, StoryTeller
+    from interfaces.system import run_loop
+    from robots.robot import USUAL_CLIENT, ThinClient, load
+    from vrs.checks import bounded_text
+
+    told = (
+        STORY if text is None else tuple(line for line in bounded_text(text, 20_000).splitlines() if line.strip())
+    )
+    if not told:
+        raise InvalidValueError("text", str(text), "a file with a sentence")
+    client = load(USUAL_CLIENT).device(ThinClient)
+    assert client is not None
+    rate = client.sound_rate
+    sound, problem = run_loop(_spoken(told, rate))
+    if problem:
+        typer.echo(f"vrs: {problem}: the story is only written", err=True)
+    if out is not None:
+        with written(out):
+            out.mkdir(parents=True, exist_ok=True)
+    with opened(read_model(client.model.with_name("story.xmi")), address, key_file=token_file) as middleware:
+        teller = StoryTeller(middleware, sound, rate)
+        typer.echo(f"vrs: waiting for somebody to come near {address}")
+        try:
+            _tell(teller, middleware, told, out, visits)
+        except KeyboardInterrupt:
+            typer.echo("")
+        finally:
+            if out is not None:
+                _write_heard(teller, out / "heard.wav")
+
+
+def _tell(teller: StoryTeller, middleware: Middleware, told: Sequence[str], out: Path | None, visits: int) -> None:
+    """Let visitors be told the story, until the session or the last visit is over."""
+    import math
+
+    seen, until = 0, -math.inf
+    while middleware.is_open and not (visits and teller.told >= visits and middleware.clock.now() >= until):
+        before, now = teller.told, middleware.clock.now()
+        who = teller.turn(now=now)
+        if who is not None:
+            typer.echo(f"vrs: somebody is {who[0]:.2f} m away, at {math.degrees(who[1]):.0f} deg to the left")
+        if teller.told > before:
+            typer.echo("\n".join(told))
+            # A picture of it comes meanwhile.
+            until = now + max(teller.lasts, 2.0)
+        while out is not None and teller.pictures:
+            seen += 1
+            with written(out):
+                (out / f"visit-{seen}.jpg").write_bytes(teller.pictures.popleft())
+        middleware.wait_for(lambda: not middleware.is_open, 0.02)
+    if not middleware.is_open:
+        raise NoSessionError("lost")
+
+
+def _write_heard(teller: StoryTeller, path: Path) -> None:
+    """Write what the microphone heard of late, as WAV."""
+    import wave
+
+    from robots.mobile.microphone import TOLD_RATE
+
+    with written(path), path.open("wb") as raw, wave.open(raw, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(TOLD_RATE)
+        file.writeframes(b"".join(piece.tobytes() for piece in tuple(teller.heard)))
+
+
+async def _spoken(sentences: Sequence[str], rate: int) -> tuple[bytes, str]:
+    """Sentences as a speaker plays them that wants a rate [1/s]; without the program nothing, and why."""
+    from interfaces.media.speech import SpeechError, cleaned, spoken
+    from interfaces.rsp.story import playable
+
+    try:
+        return b"".join([playable(*await spoken(cleaned(sentence)), rate) for sentence in sentences]), ""
+    except SpeechError as error:
+        return b"", str(error)
 
 
 def _facts(robot: RobotModel) -> dict[str, Any]:

@@ -140,6 +140,13 @@ def serve(
             "Let a class in by short codes that are printed here, with QR codes; control is queued for.",
         ),
     ] = False,
+    in_order: Annotated[
+        bool,
+        option(
+            "--in-order",
+            "Control is for who connects first; when it ends it's offered to the next, in the order of connection.",
+        ),
+    ] = False,
     val_port: Annotated[
         int | None,
         option(
@@ -264,7 +271,7 @@ def serve(
         serving.append(_Serving(
             robot, link, seed + k, policy, at, token, theirs, tuple(options), place, _own(jobs, k, robot), eye,
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
-            behind, architecture, folder,
+            behind, architecture, folder, in_order,
         ))  # fmt: skip
     taught = _Class(reached_as[0] if reached_as else "", teacher) if class_ else None
     with audit_log(audit) as log:
@@ -323,6 +330,8 @@ class _Serving:
     """Of a mobile robot that is started: what it does with the operator's path."""
     folder: str
     """Below which its page and sockets are; empty for the server's first robot."""
+    in_order: bool
+    """Whether operators get control in the order in which they connect."""
 
     def recording(self, path: Path, *, over: bool = True) -> LiveRecording:
         """What is recorded into a file, which may be written over."""
@@ -522,6 +531,7 @@ def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | N
         recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
+        in_order=serving.in_order,
     )  # fmt: skip
     return LiveOperator(config, access, clock=clock, audit=log)
 
@@ -536,9 +546,9 @@ def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool)
     offers = {Offer.RECORDINGS} | ({Offer.ARCS, Offer.JOBS} if robot.is_base else {Offer.POLYNOMIALS})
     offers |= {Offer.CAMERA} if serving.camera else set()
     offers |= {Offer.TERMINALS} if serving.val_files is not None else set()
-    offers |= {Offer.CLASS} if taught else set()
+    offers |= {Offer.QUEUE} if taught or serving.in_order else set()
     pages = [(one.robot.name, f"{one.folder}/", one is serving) for one in all_served]
-    return Station(described(robot), panels_of(offers), pages if len(pages) > 1 else ())
+    return Station(described(robot), panels_of(offers), pages if len(pages) > 1 else (), codes=taught)
 
 
 def _load() -> None:

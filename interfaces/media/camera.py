@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Final, TypeAlias
 
-from interfaces.media.messages import NEWS, News, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.media.messages import NEWS, CameraView, News, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.pipes import HEAD, start
 from robots.mobile.camera import Lens, PanTilt, PanTiltConfig
 from robots.robot import USUAL_BASE
@@ -107,7 +107,15 @@ async def camera_process(setup: Setup) -> AsyncIterator[Ask]:
 class LiveCamera:
     """Both axes, and pictures for whoever looks. Enter `running` in the loop that serves."""
 
-    def __init__(self, config: CameraConfig, room: Room, clock: Clock, stand: Stand) -> None:
+    def __init__(
+        self,
+        config: CameraConfig,
+        room: Room,
+        clock: Clock,
+        stand: Stand,
+        view: CameraView = CameraView.ROBOT,
+        axes: PanTilt | None = None,
+    ) -> None:
         """Look straight ahead; nobody looks yet.
 
         Args:
@@ -115,9 +123,11 @@ class LiveCamera:
             room: Where the robot is.
             clock: Session time.
             stand: Where the robot is.
+            view: What its pictures are of.
+            axes: Those of the robot's camera, where another one has them, too.
         """
-        self.config, self._room, self._clock, self._stand = config, room, clock, stand
-        self.axes = PanTilt(config.pan_tilt, now=clock.now())
+        self.config, self._room, self._clock, self._stand, self._view = config, room, clock, stand, view
+        self.axes = PanTilt(config.pan_tilt, now=clock.now()) if axes is None else axes
         self.problem = ""
         """Why there are no pictures; empty while there are, or none was asked for."""
         self.watchers: set[Callable[[Taken, float], None]] = set()
@@ -181,7 +191,7 @@ class LiveCamera:
             config = self.config
             try:
                 async with camera_process(
-                    Setup(config.robot, self._room, config.lens, config.rate, config.video)
+                    Setup(config.robot, self._room, config.lens, config.rate, config.video, self._view)
                 ) as ask:
                     self.problem = ""
                     await self._shoot(ask)

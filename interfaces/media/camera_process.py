@@ -1,4 +1,4 @@
-"""The process that draws what the robot's camera sees: `python -m interfaces.media.camera_process DESCRIPTOR`.
+"""The process that draws what a camera sees: `python -m interfaces.media.camera_process DESCRIPTOR`.
 
 It has a world of its own and never touches the robot's physics. It ends when the other end of its socket does.
 """
@@ -10,11 +10,11 @@ import socket
 import sys
 from typing import BinaryIO
 
-from interfaces.media.coding import VideoEncoder, encode_still, video_encoder
-from interfaces.media.messages import ORDERS, Order, Setup, Shot, Taken, decode, encode, size_of
+from interfaces.media.coding import VideoEncoder, video_encoder
+from interfaces.media.messages import ORDERS, CameraView, Order, Setup, Shot, Taken, decode, encode, size_of
 from interfaces.pipes import HEAD
 from interfaces.system import be_nice
-from robots.mobile.camera import Look, Sight
+from robots.mobile.camera import Look, Sight, jpeg
 from robots.robot import HeadCamera, load
 from vrs.clock import WallClock
 from vrs.errors import FormatError
@@ -38,15 +38,16 @@ def run(connection: socket.socket) -> int:
         setup = _order(orders)
         if not isinstance(setup, Setup):
             return 0 if setup is None else 2
-        camera, lens = load(setup.robot).device(HeadCamera), setup.lens
+        robot, lens = load(setup.robot), setup.lens
+        camera = robot.device(HeadCamera)
         if camera is None:
             return 2
-        sight = Sight(setup.room, camera, lens)
+        sight = Sight(setup.room, camera, lens, robot.appearance)
         video = video_encoder(lens.width, lens.height, setup.rate) if setup.video else None
         connection.sendall(encode(None))
         clock = WallClock()
         while isinstance(shot := _order(orders), Shot):
-            connection.sendall(encode(take(shot, sight, video, clock)))
+            connection.sendall(encode(take(shot, sight, setup.view, video, clock)))
     except FormatError:
         return 2
     except OSError:
@@ -54,12 +55,16 @@ def run(connection: socket.socket) -> int:
     return 0
 
 
-def take(shot: Shot, sight: Sight, video: VideoEncoder | None, clock: WallClock) -> Taken:
+def take(shot: Shot, sight: Sight, view: CameraView, video: VideoEncoder | None, clock: WallClock) -> Taken:
     """Draw a picture, and encode it as it's wanted."""
     began = clock.now()
-    picture = sight.draw(shot.posture, Look(*shot.look), shot.t)
+    if view is CameraView.OVERHEAD:
+        picture = sight.above(shot.posture, shot.t)
+    else:
+        draw = sight.both if view is CameraView.BOTH else sight.draw
+        picture = draw(shot.posture, Look(*shot.look), shot.t)
     frame, key = (b"", False) if video is None else video(picture, shot.key)
-    still = encode_still(picture) if shot.still else b""
+    still = jpeg(picture) if shot.still else b""
     return Taken(shot.number, frame, key, still, clock.now() - began)
 
 

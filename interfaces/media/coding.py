@@ -1,8 +1,7 @@
-"""Pictures and sound as browsers take them: VP8 and Opus by PyAV, of the extra `[media]`, and JPEG by Pillow."""
+"""Pictures and sound as browsers take them: VP8 and Opus by PyAV, of the extra `[media]`."""
 
 from __future__ import annotations
 
-import io
 import itertools
 import math
 from collections import deque
@@ -24,7 +23,6 @@ BITS: Final = 800_000
 """Of video a second at most."""
 KEY_PERIOD: Final = 2.0
 """Time between two whole pictures [s]: so long at most a receiver that lost one shows nothing new."""
-STILL_QUALITY: Final = 85
 _LEAD_OUT: Final = 0.08
 """Silence after what is said [s]: the last sound isn't cut off."""
 
@@ -72,6 +70,34 @@ def video_encoder(width: int, height: int, rate: float) -> VideoEncoder:
     return encode
 
 
+SoundEncoder: TypeAlias = Callable[[Any], bytes]
+"""Encodes a frame of `SOUND_PERIOD`: 16 bits, two channels, `SOUND_RATE`."""
+
+
+def _sound_encoder(application: str) -> SoundEncoder:
+    """Begin a stream of Opus, for one of its applications."""
+    import av
+
+    codec: Any = av.CodecContext.create("libopus", "w")
+    codec.bit_rate, codec.format, codec.layout, codec.sample_rate = 48_000, "s16", "stereo", SOUND_RATE
+    codec.time_base, codec.options = Fraction(1, SOUND_RATE), {"application": application}
+    return lambda frame: b"".join(bytes(packet) for packet in codec.encode(frame))
+
+
+def room_encoder() -> Callable[[NDArray[np.int16]], bytes]:
+    """Begin one stream of Opus of a microphone: it takes the samples of each `SOUND_PERIOD`, (960,)."""
+    import av
+
+    encode, times = _sound_encoder("audio"), itertools.count(0, round(SOUND_RATE * SOUND_PERIOD))
+
+    def packet(samples: NDArray[np.int16]) -> bytes:
+        frame = av.AudioFrame.from_ndarray(np.repeat(samples, 2)[None], format="s16", layout="stereo")
+        frame.sample_rate, frame.pts = SOUND_RATE, next(times)
+        return encode(frame)
+
+    return packet
+
+
 def encode_sound(samples: NDArray[np.int16], rate: int) -> tuple[bytes, ...]:
     """Encode what is said.
 
@@ -84,9 +110,7 @@ def encode_sound(samples: NDArray[np.int16], rate: int) -> tuple[bytes, ...]:
     """
     import av
 
-    codec: Any = av.CodecContext.create("libopus", "w")
-    codec.bit_rate, codec.format, codec.layout, codec.sample_rate = 48_000, "s16", "stereo", SOUND_RATE
-    codec.time_base, codec.options = Fraction(1, SOUND_RATE), {"application": "voip"}
+    encode = _sound_encoder("voip")
     quiet = np.zeros(round(_LEAD_OUT * rate), dtype=np.int16)
     frame = av.AudioFrame.from_ndarray(np.concatenate([samples, quiet])[None], format="s16", layout="mono")
     frame.sample_rate, frame.pts = rate, 0
@@ -94,16 +118,7 @@ def encode_sound(samples: NDArray[np.int16], rate: int) -> tuple[bytes, ...]:
     resampler = av.AudioResampler(format="s16", layout="stereo", rate=SOUND_RATE, frame_size=size)
     frames = [*resampler.resample(frame), *resampler.resample(None)]
     whole = [part for part in frames if part.samples == size]
-    return tuple(bytes(packet) for part in whole for packet in codec.encode(part))
-
-
-def encode_still(picture: NDArray[np.uint8]) -> bytes:
-    """A picture, (height, width, 3), as JPEG."""
-    from PIL import Image
-
-    file = io.BytesIO()
-    Image.fromarray(picture).save(file, "JPEG", quality=STILL_QUALITY)
-    return file.getvalue()
+    return tuple(encode(part) for part in whole)
 
 
 SILENCE: Final = b"\xfc\xff\xfe"

@@ -3,6 +3,7 @@
 A page first shows its token, as at `/meshcat`; then it's told how everything is, as text in JSON, and may ask:
 
     {"do": "watch", "offer": SDP}                                    a viewer: picture and sound by RTP
+    {"do": "choose", "view": "robot" | "overhead" | "both", "hears": …}   a viewer: which camera, and the microphone
     {"do": "leave"}                                                  a viewer: neither any more
     {"do": "aim", "session": …, "epoch": …, "pan": …, "tilt": …}     who has control: turn the camera [rad]
     {"do": "speak" | "show", "session": …, "epoch": …, "text": …}    who has control: say or show something
@@ -24,7 +25,8 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.media.camera import CameraError
-from interfaces.media.live import LiveMedia
+from interfaces.media.live import LiveMedia, MediaChoice
+from interfaces.media.messages import CameraView
 from interfaces.messages.control import Role
 from interfaces.stream.access import Access, bearer
 from interfaces.stream.limits import Bucket
@@ -39,6 +41,7 @@ from interfaces.stream.meshcat.page import (
 )
 from interfaces.stream.server import HEADERS
 from interfaces.stream.sockets import let_stay
+from vrs.checks import one_of
 from vrs.errors import InvalidValueError, VrsError
 
 MOST_PAGES: Final = 256
@@ -61,6 +64,8 @@ class _MediaAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pan: float = 0.0
     tilt: float = 0.0
     text: str = ""
+    view: str = CameraView.ROBOT
+    hears: bool = False
 
 
 class MediaDoor:
@@ -120,7 +125,10 @@ class MediaDoor:
         if not self._stills.take(self._media.clock.now()):
             return JSONResponse({"problem": "too many pictures: try again in a moment"}, 429, HEADERS)
         try:
-            data = await self._media.camera.still()
+            view = one_of("view", request.query_params.get("view", CameraView.ROBOT), CameraView)
+            data = await self._media.cameras[CameraView(view)].still()
+        except InvalidValueError as error:
+            return JSONResponse({"problem": str(error)}, 400, HEADERS)
         except CameraError as error:
             return JSONResponse({"problem": str(error)}, 503, HEADERS)
         return Response(data, 200, {**HEADERS, "Cache-Control": "no-store"}, "image/jpeg")
@@ -134,6 +142,7 @@ class _Page:
         self.news = asyncio.Event()
         """Set when there's something new to tell."""
         self.news.set()
+        self._choice = MediaChoice()
         self._replies: list[str] = []
         self._told = ""
 
@@ -209,12 +218,16 @@ class _Page:
     async def _do(self, ask: _MediaAsk) -> dict[str, Any]:
         media = self._media
         if ask.do == "watch":
-            return {"kind": "answer", "sdp": await media.watch(self, ask.offer)}
+            return {"kind": "answer", "sdp": await media.watch(self, ask.offer, self._choice)}
+        if ask.do == "choose":
+            self._choice = MediaChoice(CameraView(one_of("view", ask.view[:40], CameraView)), ask.hears)
+            media.choose(self, self._choice)
+            return {}
         if ask.do == "leave":
             await media.leave(self)
             return {}
         if ask.do not in {"aim", "speak", "show", "clear"}:
-            raise InvalidValueError("do", ask.do[:40], "watch, leave, aim, speak, show or clear")
+            raise InvalidValueError("do", ask.do[:40], "watch, choose, leave, aim, speak, show or clear")
         if not media.commands(ask.session, ask.epoch):
             return {"kind": "problem", "text": "only who has control moves the camera, speaks and shows"}
         if ask.do == "aim":

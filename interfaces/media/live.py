@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Callable, Hashable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from interfaces.media.camera import CameraConfig, LiveCamera, Stand
 from interfaces.media.coding import VoicePlayout, missing
+from interfaces.media.hearing import LiveMicrophone
+from interfaces.media.messages import CameraView
 from interfaces.media.offer import OfferError
 from interfaces.media.presenter import Presenter
 from interfaces.media.speech import PROGRAM, SpeechError, cleaned, program
+from robots.mobile.camera import PanTilt
+from robots.mobile.microphone import Microphone
+from robots.robot import HeadCamera, load
 from robots.rooms import Room
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
@@ -26,6 +32,15 @@ TELL: Final = 0.1
 """Time between two looks at what there's to tell [s]."""
 _DECIMALS: Final = 4
 """Decimals of an angle that is told [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class MediaChoice:
+    """What a page wants to see and hear."""
+
+    view: CameraView = CameraView.ROBOT
+    hears: bool = False
+    """Whether it listens to the robot's microphone."""
 
 
 class LiveMedia:
@@ -55,7 +70,15 @@ class LiveMedia:
         self.missing = missing() if config.video else ""
         """What there's no video and sound for want of; empty with the whole extra."""
         video = config.video and not self.missing
-        self.camera = LiveCamera(replace(config, video=video), room, clock, stand)
+        config = replace(config, video=video)
+        axes = PanTilt(config.pan_tilt, now=clock.now())
+        self.cameras = {view: LiveCamera(config, room, clock, stand, view, axes) for view in CameraView}
+        """By what they show."""
+        self.camera = self.cameras[CameraView.ROBOT]
+        """The robot's own."""
+        head = load(config.robot).device(HeadCamera)
+        self.microphone = LiveMicrophone(Microphone(room, 0.0 if head is None else head.neck[2]), stand)
+        """The robot's, in its head."""
         self._playout = VoicePlayout()
         audible = video and program() is not None
         self.presenter = Presenter(clock, self._playout, screen=screen, audible=audible)
@@ -79,7 +102,9 @@ class LiveMedia:
         """Make pictures, and tell pages how everything is."""
         telling = asyncio.create_task(self._tell())
         try:
-            async with self.camera.running():
+            async with contextlib.AsyncExitStack() as cameras:
+                for camera in self.cameras.values():
+                    await cameras.enter_async_context(camera.running())
                 yield self
         finally:
             tasks = {telling, *self._tasks}
@@ -117,12 +142,24 @@ class LiveMedia:
             "limits": [-limits.pan, limits.pan, -limits.down, limits.up],
             "view": camera.config.lens.view,
             "rate": camera.config.rate,
-            "problem": camera.problem,
+            "problem": self._problem,
             "saying": presenter.saying,
             "voice": presenter.problem,
             "message": presenter.message,
+            "microphone": self.microphone.hears,
+            "level": self._level(),
             "peers": self.peers,
         }
+
+    @property
+    def _problem(self) -> str:
+        """Why a camera gives no pictures; empty while all do that are asked."""
+        return next((camera.problem for camera in self.cameras.values() if camera.problem), "")
+
+    def _level(self) -> int | None:
+        """How loud it is at the robot, in whole dB; None below what people hear."""
+        level = self.microphone.level(self.clock.now()) if self.microphone.hears else -math.inf
+        return round(level) if level >= 0.0 else None
 
     def health(self) -> dict[str, Any]:
         """How it is, for `/health`."""
@@ -132,7 +169,7 @@ class LiveMedia:
             "pictures": camera.taken,
             "rate": camera.rate,
             "took": camera.took,
-            "problem": camera.problem,
+            "problem": self._problem,
             "voice": self.presenter.problem,
             "peers": self.peers,
         }
@@ -166,12 +203,18 @@ class LiveMedia:
         except VrsError as error:
             self.presenter.problem = str(error)
 
-    async def watch(self, page: Hashable, offer: str) -> str:
+    def choose(self, page: Hashable, choice: MediaChoice) -> None:
+        """Show and play another choice to a page from now on, if it watches."""
+        if (peer := self._peers.get(page)) is not None:
+            peer.choose(self.cameras[choice.view], hears=choice.hears)
+
+    async def watch(self, page: Hashable, offer: str, choice: MediaChoice) -> str:
         """Give a page picture and sound, in place of what it had.
 
         Args:
             page: Who asks.
             offer: SDP.
+            choice: What it wants to see and hear.
 
         Returns:
             The answer, SDP.
@@ -188,7 +231,8 @@ class LiveMedia:
         await self.leave(page)
         if len(self._peers) >= MOST_PEERS:
             raise OfferError(f"{MOST_PEERS} watch already")
-        peer = self._peers[page] = Peer(self.camera, self._playout, self.clock)
+        peer = self._peers[page] = Peer(self.camera, self._playout, self.microphone, self.clock)
+        self.choose(page, choice)
         try:
             answer = await peer.answer(offer)
         except OfferError:

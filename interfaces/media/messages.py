@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Final, TypeAlias, TypeVar
 
 import msgspec
@@ -15,6 +16,17 @@ MESSAGE_MOST: Final = 1 << 24
 """Largest message [bytes]."""
 
 
+class CameraView(StrEnum):
+    """What pictures are of."""
+
+    ROBOT = "robot"
+    """What the robot's own camera sees."""
+    OVERHEAD = "overhead"
+    """The room from above."""
+    BOTH = "both"
+    """The first, with the second in its corner."""
+
+
 class Setup(msgspec.Struct, frozen=True, tag=True):
     """Site: what is to be seen, and how; the first message."""
 
@@ -26,6 +38,7 @@ class Setup(msgspec.Struct, frozen=True, tag=True):
     """Pictures a second that are asked for; the encoder spreads its bits by it."""
     video: bool
     """Whether pictures are to be encoded for RTP."""
+    view: CameraView = CameraView.ROBOT
 
 
 class Shot(msgspec.Struct, frozen=True, tag=True):

@@ -24,7 +24,8 @@ from aiortc.mediastreams import MediaStreamError
 from av.packet import Packet
 
 from interfaces.media.camera import LiveCamera
-from interfaces.media.coding import SOUND_PERIOD, SOUND_RATE, VIDEO_CLOCK, VoicePlayout
+from interfaces.media.coding import SILENCE, SOUND_PERIOD, SOUND_RATE, VIDEO_CLOCK, VoicePlayout
+from interfaces.media.hearing import LiveMicrophone
 from interfaces.media.messages import Taken
 from interfaces.media.offer import OfferError, canonical
 from vrs.clock import Clock
@@ -64,6 +65,11 @@ class VideoTrack(MediaStreamTrack):
         self._frames.append(packet)
         self._come.set()
 
+    def renew(self) -> None:
+        """Go on with the pictures of another camera, the first whole one first."""
+        self._frames.clear()
+        self._whole = True
+
     async def recv(self) -> Packet[Any]:
         """The next picture."""
         while not self._frames:
@@ -80,13 +86,18 @@ class VideoTrack(MediaStreamTrack):
 
 
 class SoundTrack(MediaStreamTrack):
-    """What is said, for one peer, in time with all others."""
+    """What is said, for one peer, in time with all others; while nothing is, what the robot hears, if it's wanted.
+
+    A robot that speaks doesn't listen: it would hear itself alone.
+    """
 
     kind = "audio"
 
-    def __init__(self, playout: VoicePlayout, clock: Clock) -> None:
+    def __init__(self, playout: VoicePlayout, microphone: LiveMicrophone, clock: Clock) -> None:
         super().__init__()
-        self._playout, self._clock = playout, clock
+        self._playout, self._microphone, self._clock = playout, microphone, clock
+        self.hears = False
+        """Whether the microphone is wanted."""
         self._origin, self._count = clock.now(), 0
 
     async def recv(self) -> Packet[Any]:
@@ -99,7 +110,10 @@ class SoundTrack(MediaStreamTrack):
             self._count += int(late / SOUND_PERIOD)
             due = self._origin + self._count * SOUND_PERIOD
         await asyncio.sleep(max(0.0, -late))
-        packet: Packet[Any] = Packet(self._playout.at(due))
+        data = self._playout.at(due)
+        if self.hears and data is SILENCE:
+            data = self._microphone.at(due)
+        packet: Packet[Any] = Packet(data)
         packet.pts, packet.time_base = round(self._count * SOUND_PERIOD * SOUND_RATE), Fraction(1, SOUND_RATE)
         self._count += 1
         return packet
@@ -108,18 +122,30 @@ class SoundTrack(MediaStreamTrack):
 class Peer:
     """One browser that watches and listens."""
 
-    def __init__(self, camera: LiveCamera, playout: VoicePlayout, clock: Clock) -> None:
+    def __init__(self, camera: LiveCamera, playout: VoicePlayout, microphone: LiveMicrophone, clock: Clock) -> None:
         self._camera = camera
         self.connection = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         self._video = VideoTrack()
         transceiver = self.connection.addTransceiver(self._video, "sendonly")
         transceiver.setCodecPreferences(_codecs())
-        self.connection.addTransceiver(SoundTrack(playout, clock), "sendonly")
+        self._sound = SoundTrack(playout, microphone, clock)
+        self.connection.addTransceiver(self._sound, "sendonly")
         self.connected = asyncio.Event()
         """Set when picture and sound are under way."""
         self.ended = asyncio.Event()
         """Set when the connection is over."""
         self.connection.on("connectionstatechange", self._look)
+
+    def choose(self, camera: LiveCamera, *, hears: bool) -> None:
+        """Show what a camera sees from now on, and let the microphone be heard, or not."""
+        self._sound.hears = hears
+        if camera is self._camera:
+            return
+        before, self._camera = self._camera, camera
+        if self._video.put in before.watchers:
+            before.watchers.discard(self._video.put)
+            self._video.renew()
+            camera.watch(self._video.put)
 
     async def answer(self, offer: str) -> str:
         """Answer a browser's offer to receive a picture and a sound.

@@ -6,18 +6,25 @@ is a register: its monitor tells what it was told. A sensor without one says 0.
 
 from __future__ import annotations
 
+import logging
 from typing import Final, Protocol
 
-from interfaces.rsp.model.elements import Command, Effector, Event, MemoryCommand, Scalar, Sensor
+from interfaces.rsp.errors import FullError
+from interfaces.rsp.model.elements import Command, Effector, Event, MemoryCommand, MemoryEvent, Scalar, Sensor
 from interfaces.rsp.motion_filter import Values
 from interfaces.rsp.outputs import Commanded, RobotChange, Stored
 from interfaces.rsp.robot import RobotCore
 from interfaces.rsp.session import SLACK
+from vrs.errors import InvalidValueError
+
+_LOG: Final = logging.getLogger(__name__)
 
 PERIOD: Final = 0.016
 """Between two looks at effectors and sensors [s]; rounded to whole steps of the body."""
 FRAGMENT_TIME: Final = 0.02
 """How long a fragment of sound is played [s]."""
+MEMORY_PATIENCE: Final = 5.0
+"""A memory event that isn't acknowledged after so long is given up [s]."""
 MOST_BEHIND: Final = 0.25
 """How much the body makes up for at most when its host was late [s]; the rest of the time it stood still."""
 
@@ -39,6 +46,9 @@ class HostedBody(Protocol):
 
     def events(self) -> list[str]:
         """Bindings of what happened since the last call."""
+
+    def memories(self) -> list[tuple[str, bytes]]:
+        """Bindings of memory events since the last call, and their data."""
 
     def go_on(self, steps: int = 1) -> None:
         """Go on by steps."""
@@ -73,9 +83,12 @@ class RspHost:
         self._speakers = [i for i, e in enumerate(self.model) if isinstance(e, Effector) and e.stream]
         self._sensors = [(i, e) for i, e in enumerate(self.model) if isinstance(e, Sensor)]
         self._events: dict[str, list[tuple[int, Event]]] = {}
+        self._memories: dict[str, list[int]] = {}
         for index, element in enumerate(self.model):
             if isinstance(element, Event):
                 self._events.setdefault(element.binding, []).append((index, element))
+            elif isinstance(element, MemoryEvent):
+                self._memories.setdefault(element.binding, []).append(index)
             elif isinstance(element, Effector) and element.initial and not element.stream:
                 self._move(element, (element.initial,) * element.count)
         self._measure()
@@ -127,6 +140,18 @@ class RspHost:
         for binding in self.body.events():
             for index, event in self._events.get(binding, ()):
                 self.core.occur(index, packed(event, (1.0,) * event.count))
+        for binding, data in self.body.memories():
+            for index in self._memories.get(binding, ()):
+                self._store(index, data, now)
+
+    def _store(self, index: int, data: bytes, now: float) -> None:
+        """Let the local system get a memory event, if there is one and it has room."""
+        if self.core.session is None:
+            return
+        try:
+            self.core.store(index, data, deadline=now + MEMORY_PATIENCE)
+        except (InvalidValueError, FullError) as error:
+            _LOG.warning("a memory event of %s is left out: %s", self.model.elements[index].name, error)
 
     def _move(self, element: Effector, values: Values) -> None:
         if element.binding in self._moves:

@@ -51,7 +51,12 @@ class Station:
     """The page `/` of a robot, and the files below `/station/`."""
 
     def __init__(
-        self, robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]] = ()
+        self,
+        robot: Mapping[str, Any],
+        panels: Sequence[Panel],
+        robots: Sequence[tuple[str, str, bool]] = (),
+        *,
+        codes: bool = False,
     ) -> None:
         """Make the page.
 
@@ -59,8 +64,9 @@ class Station:
             robot: What the panels' scripts are told of it, see `chain.described`.
             panels: What the page has, see `panels_of`.
             robots: Where the server has several, of each its name, where its page is, and whether that's this one.
+            codes: Whether the server tells codes by which a class comes in.
         """
-        self._page = KeptFile.of(_page(robot, panels, robots).encode())
+        self._page = KeptFile.of(_page(robot, panels, robots, codes=codes).encode())
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -71,7 +77,9 @@ class Station:
         return self._page.answer(request, "text/html", HEADERS)
 
 
-def _page(robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]]) -> str:
+def _page(
+    robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]], *, codes: bool
+) -> str:
     """Its HTML: one element, which the scripts fill, and what those are told."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -79,5 +87,5 @@ def _page(robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tu
         loader=PackageLoader("interfaces.station"), undefined=StrictUndefined, trim_blocks=True, autoescape=True
     )
     listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in panels]
-    config = json.dumps({"robot": robot, "panels": listed, "robots": robots})
+    config = json.dumps({"robot": robot, "panels": listed, "robots": robots, "codes": codes})
     return templates.get_template("index.html").render(config=config)

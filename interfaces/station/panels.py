@@ -27,8 +27,8 @@ class Offer(StrEnum):
     TERMINALS = "terminals"
     """VAL-II's, for pages."""
     RECORDINGS = "recordings"
-    CLASS = "class"
-    """People who come in by codes, and a queue for control."""
+    QUEUE = "queue"
+    """People who queue for control: a class, or all in the order in which they connect."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ PANELS: Final[tuple[Panel, ...]] = (
     Panel("terminal", "Terminal", "side", icon="terminal", of=Offer.TERMINALS),
     Panel("network", "Link", "side", icon="network_check"),
     Panel("record", "Record", "side", icon="fiber_manual_record", of=Offer.RECORDINGS),
-    Panel("class", "Class", "side", icon="person", of=Offer.CLASS),
+    Panel("class", "People", "side", icon="person", of=Offer.QUEUE),
     Panel("strip", "Timeline", "strip", of=Offer.POLYNOMIALS),
 )
 """What pages may have, in the order of their tabs and of the keyboard."""

@@ -150,6 +150,8 @@ class HubConfig:
     instance: str = ""
     """Names this run of it; with another one there's another timeline."""
     limits: ClientLimits = field(default_factory=ClientLimits)
+    in_order: bool = False
+    """Whether operators get control in the order in which they connect: they queue for it from then on."""
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.state_rate <= 1000:
@@ -477,9 +479,10 @@ class Hub:
         self.encoder = SharedEncoder(256)
         """What all clients get is written once."""
         self.site, self.access = site, access
-        classroom = None if access.invitations is None else Classroom()
+        in_order = self.config.in_order
+        classroom = Classroom() if in_order or access.invitations is not None else None
         self._audit = audit
-        self.leasing = Leasing(lease, robot, self.limits.sharers, classroom, note=self._note)
+        self.leasing = Leasing(lease, robot, self.limits.sharers, classroom, in_order=in_order, note=self._note)
         """Who may command."""
         self.present = Present()
         """Who is here of a class, as its clients are told."""

@@ -221,6 +221,7 @@ class Leasing:
         sharers: int,
         classroom: Classroom | None = None,
         *,
+        in_order: bool = False,
         note: Callable[..., None] = lambda *_, **_facts: None,
     ) -> None:
         """Nobody has it yet.
@@ -230,11 +231,12 @@ class Leasing:
             robot: What the lease does to the robot.
             sharers: Sessions that may share it, at most.
             classroom: Who queues for it; None where nobody does.
+            in_order: Whether operators are in the queue from when they connect first.
             note: Is told when somebody gets the lease, shares it or asks for it by force, and when it ends: what,
                 which session if it's known, and other facts by name.
         """
         self.lease, self._robot, self._sharers, self.classroom = lease, robot, sharers, classroom
-        self._note = note
+        self._in_order, self._note = in_order, note
         self.version = 0
         """Counts the changes of the lease."""
         self.holder: SessionState | None = None
@@ -248,6 +250,8 @@ class Leasing:
         """Let a session in that isn't of this process."""
         if self.classroom is not None:
             self.classroom.enter(seat)
+            if self._in_order and seat.role is Role.OPERATOR:
+                self.classroom.request(seat)
 
     def note(self, seat: SessionState, *, here: bool) -> None:
         """Note that a session has a connection, or has lost it."""

@@ -9,17 +9,20 @@ from collections import deque
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from robots.cubo import parameters as p
+from robots.cubo.shapes import EYE
 from robots.mobile.body import MobileBody
+from robots.mobile.camera import Lens, Look, Sight, jpeg
 from robots.mobile.chassis import Limb, MobileReality, Senses, SonarModel
+from robots.mobile.microphone import TOLD, TOLD_MODULUS, TOLD_RATE, Microphone, samples_of
 from robots.mobile.position import FusedPosition, TruePosition
 from robots.rooms import Room
 from robots.simulated import USUAL_WORLD
 from vrs.checks import finite
 from vrs.errors import InvalidValueError
-from vrs.mobile import clipped
+from vrs.mobile import DriveLimits, clipped
 
 Values = tuple[float, ...]
 BUTTONS: Final = ("service", "message")
@@ -29,11 +32,20 @@ and a speed [rad/s] if a second value is there and not 0. Lip and screen show wh
 fragments."""
 MEASURES: Final = (
     "position", "encoders", "proximity", "bumper", "gyro", "battery", "wheels", "arm.left", "arm.right", "tilt",
+    "microphone",
 )  # fmt: skip
 """Bindings of sensors: (x, y, θ) [m, m, rad]; counts right, left; distances [m], 8 around from straight ahead, the
-reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds right, left [m/s]; angles [rad]."""
-COMMANDS: Final = ("ir", "say", "stop")
-"""Bindings of commands: the infrared remote control sends a code, a phrase is said, arms, head and wheels stop."""
+reach where nothing is; 1 if something is touched; ω [rad/s]; [V]; rim speeds right, left [m/s]; angles [rad]; how
+many samples were heard, modulo `TOLD_MODULUS`, and the newest `TOLD` of them."""
+COMMANDS: Final = ("ir", "say", "stop", "look")
+"""Bindings of commands: the infrared remote control sends a code, a phrase is said, arms, head and wheels stop, a
+picture is taken, of which `memories` tells."""
+LENS: Final = Lens(width=160, height=120)
+"""Of its small camera. Chosen."""
+_FRAGMENT: Final = TOLD_RATE // 50
+"""Samples of the microphone while a fragment is played."""
+_LOUD: Final = 0.25
+"""Share of its own voice that the microphone gets."""
 _LIMBS: Final = {"arm.right": 0, "arm.left": 1, "tilt": 2}
 _MOST_KEPT: Final = 256
 """Of what was said, sent and played."""
@@ -50,6 +62,7 @@ class CuboBody(MobileBody):
         room: Room | str | None = None,
         reality: MobileReality | None = None,
         rng: np.random.Generator | int = 0,
+        limits: DriveLimits = p.LIMITS,
         senses: Senses | None = None,
         exact: bool = False,
     ) -> None:
@@ -61,6 +74,7 @@ class CuboBody(MobileBody):
             room: A room, or the name of one that comes with the package; only a floor, unless given.
             reality: How real it is; everything, unless given.
             rng: What slips and noise are drawn from, or a seed.
+            limits: How fast it may drive.
             senses: What it senses with; proximity, unless given, and what tells it where it is.
             exact: Whether it knows its posture exactly, instead of by odometry and an overhead camera.
 
@@ -78,10 +92,17 @@ class CuboBody(MobileBody):
         self._events: deque[str] = deque(maxlen=_MOST_KEPT)
         self._touched = False
         self._sounding = 0.0
+        self._memories: list[tuple[str, bytes]] = []
+        self._sight: Sight | None = None
+        self._voice: deque[bytes] = deque([b""], maxlen=4)
+        self._voiced = np.zeros(0)
+        self._heard: NDArray[np.int16] = np.zeros(TOLD, dtype=np.int16)
+        self._heard_until = 0
         senses = Senses(sonar=SonarModel(rate=20.0, noise=0.002, rays=3)) if senses is None else senses
         super().__init__(
-            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=p.LIMITS, senses=senses
+            p.CUBO, posture, world=world, room=room, reality=reality, rng=rng, limits=limits, senses=senses
         )
+        self._ear, self._ear_at = Microphone(self.room, EYE.neck[2]), (*self.truth[:2], self.time)
         self._position = TruePosition(self) if exact else FusedPosition(self)
         self._posture = self._position.posture()
 
@@ -115,10 +136,23 @@ class CuboBody(MobileBody):
             self.rims = [0.0, 0.0]
             for number, angle in enumerate(self.angles()):
                 self._swing(p.CUBO.limbs[number], number, (angle,))
+        elif binding == "look":
+            if self._sight is None:
+                self._sight = Sight(self.room, EYE, LENS)
+            x, y, angle = self.truth
+            self._memories.append(
+                ("camera", jpeg(self._sight.draw((x, y, angle), Look(0.0, -self.angles()[2]), self.time)))
+            )
+
+    def memories(self) -> list[tuple[str, bytes]]:
+        """What there's to be sent whole since the last call, by binding: of `camera` pictures, as JPEG."""
+        found, self._memories = self._memories, []
+        return found
 
     def sound(self, data: bytes | None) -> None:
         """Play a fragment of sound, or silence where there's none."""
         self.played += len(data or b"")
+        self._voice.append(data or b"")
         self._sounding = 2.0 if data else 0.0
 
     def press(self, button: str) -> None:
@@ -153,6 +187,9 @@ class CuboBody(MobileBody):
             case "wheels":
                 right, left = self.wheels
                 return right.speed * p.WHEEL_RADIUS, left.speed * p.WHEEL_RADIUS
+            case "microphone":
+                self._listen()
+                return float(self._heard_until % TOLD_MODULUS), *self._heard.tolist()
         return (self.angles()[_LIMBS[binding]],) if binding in _LIMBS else None
 
     def events(self) -> list[str]:
@@ -193,7 +230,32 @@ class CuboBody(MobileBody):
             self._events.append("bumper")
         self._touched = bool(self.touching)
 
+    def _listen(self) -> None:
+        """Hear the room and its own voice, from when it listened last."""
+        until, place = int(self.time * TOLD_RATE + 0.5), (*self.truth[:2], self.time)
+        count = min(until - self._heard_until, TOLD)
+        if count <= 0:
+            return
+        while len(self._voiced) < count and self._voice:
+            self._voiced = np.concatenate([self._voiced, _as_heard(self._voice.popleft())])
+        own, self._voiced = self._voiced[:count], self._voiced[count:]
+        times = np.arange(until - count + 1, until + 1) / TOLD_RATE
+        heard = samples_of(self._ear.hear(self._ear_at, place, times)).astype(np.float64)
+        heard[: len(own)] += _LOUD * own
+        self._heard = np.concatenate([self._heard, np.clip(heard, -32767, 32767).astype(np.int16)])[-TOLD:]
+        self._heard_until, self._ear_at = until, place
+
     def _swing(self, limb: Limb, number: int, values: Values) -> None:
         speed = (abs(values[1]) if len(values) > 1 else 0.0) or limb.speed
         angle = min(max(values[0], limb.low), limb.high)
         self.vehicle.swing(number, angle, min(max(speed, 1e-3), limb.speed))
+
+
+def _as_heard(fragment: bytes) -> NDArray[np.float64]:
+    """A fragment of what is played, of any length, as it's sampled by the microphone: means, (160,)."""
+    played = np.frombuffer(fragment, dtype="<i2", count=len(fragment) // 2)
+    if not len(played):
+        return np.zeros(_FRAGMENT)
+    total = np.concatenate([[0.0], np.cumsum(played, dtype=np.float64)])
+    edges = np.linspace(0.0, len(played), _FRAGMENT + 1)
+    return np.asarray(np.diff(np.interp(edges, np.arange(len(total)), total)) / (len(played) / _FRAGMENT))

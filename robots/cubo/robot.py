@@ -8,7 +8,7 @@ from typing import Final
 from robots.base import PERIOD, Footprint, MobileBase
 from robots.cubo.body import MOVES, CuboBody
 from robots.cubo.parameters import CUBO, LIMITS, MASS, MODEL_FILE, WHEEL_BASE, WHEEL_RADIUS
-from robots.cubo.shapes import shapes
+from robots.cubo.shapes import EYE, shapes
 from robots.mobile.shapes import links
 from robots.robot import Appearance, Robot, ThinClient
 from robots.simulated import WORLDS
@@ -25,6 +25,6 @@ ROBOT: Final = Robot(
     ),
     Appearance(shapes, partial(links, CUBO)),
     {world: partial(CuboBody, world=world) for world in WORLDS},
-    (ThinClient(MODEL_FILE, MOVES),),
+    (ThinClient(MODEL_FILE, MOVES), EYE),
 )
 """The thin client: it plans nothing, RSP drives it."""

@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 
 from robots.cubo import parameters as p
-from robots.mobile.shapes import DARK, GLASS, STEEL, WHITE, box, caster, rounded, wheel
-from robots.solids import Builder, LinkShape, drum, loft, slab
+from robots.mobile.shapes import DARK, GLASS, STEEL, WHITE, box, caster, links, rounded, wheel
+from robots.robot import HeadCamera
+from robots.solids import Builder, LinkShape, drum, loft, slab, together
 
 ORANGE: Final = (0.93, 0.48, 0.16)
 SCREEN: Final = (0.09, 0.16, 0.22)
@@ -111,3 +112,12 @@ def shapes() -> tuple[LinkShape, ...]:
         _arm("left arm", 1),
         _head(),
     )
+
+
+def headless() -> LinkShape:
+    """Build the robot without its head: what the camera in the head may see of it, in the robot's frame."""
+    return together(list(zip(shapes()[:-1], links(p.CUBO, (0.0, 0.0, 0.0)), strict=False)))
+
+
+EYE: Final = HeadCamera((0.0, 0.0, p.NECK[2] + 0.0735), 0.072, headless)
+"""Its camera; taken to tilt about the middle of the head at its own height, some cm above the head's axis."""

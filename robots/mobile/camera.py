@@ -9,6 +9,7 @@ It sees the room, what comes and goes in it, people, and the robot's own body.
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 from typing import Annotated, Final, NamedTuple
@@ -19,7 +20,7 @@ from msgspec import Meta
 from robots.base import upright
 from robots.mobile.renderer import Picture, Renderer
 from robots.mobile.shapes import GROUND, box, door_shape, person_shape, room_shapes
-from robots.robot import HeadCamera
+from robots.robot import Appearance, HeadCamera
 from robots.rooms import EMPTY, Room, is_wall
 from robots.solids import Builder, LinkShape
 from vrs.checks import finite, number_in, validated, within
@@ -152,28 +153,43 @@ _AROUND: Final = 12.0
 """So far the floor of no room is drawn around the robot [m]."""
 _CEILING: Final = (0.90, 0.90, 0.88)
 _MOST_TILES: Final = 4000
+_QUALITY: Final = 85
+"""Of a JPEG."""
+OVERHEAD_VIEW: Final = math.radians(25.0)
+"""Horizontal angle of view of the overhead camera [rad]: so narrow that walls hide little, from high above."""
+OVERHEAD_SPAN: Final = 12.0
+"""It shows a room whole, but no more of it than so much, about the robot [m]."""
+_SPARE: Final = 1.05
+"""So much more than that is seen."""
+_INSET: Final = 0.4
+"""Share of the picture's width that the overhead one takes in its corner."""
 
 
 class Sight:
-    """Draws a room as the robot's camera sees it."""
+    """Draws a room as the robot's camera sees it, and as one sees it from above."""
 
-    def __init__(self, room: Room, camera: HeadCamera, lens: Lens | None = None) -> None:
+    def __init__(
+        self, room: Room, camera: HeadCamera, lens: Lens | None = None, looks: Appearance | None = None
+    ) -> None:
         """Build the room once.
 
         Args:
             room: Where the robot is.
             camera: Where it sits on the robot.
             lens: What it sees of what is before it.
+            looks: What the robot is from above; unless given, that's what its own camera may see of it.
         """
         self.lens = Lens() if lens is None else lens
         self._room, self._camera, self._renderer = room, camera, Renderer()
-        self._endless = room == EMPTY
+        self._endless, self._ceiling = room == EMPTY, -1
         if self._endless:
             self._floor = self._tile((-_AROUND, -_AROUND), (_AROUND, _AROUND), TILE)
         else:
             self._tile((0.0, 0.0), (room.length, room.width), _tile_side(room))
             self._cover()
         add = self._renderer.add
+        self._looks = looks
+        self._whole = [] if looks is None else [add(shape) for shape in looks.shapes()]
         _, *things = room_shapes(room)
         self._things = [(add(shape), thing) for shape, thing in zip(things, room.things, strict=True)]
         self._doors = [(add(door_shape(door)), door) for door in room.doors]
@@ -188,7 +204,64 @@ class Sight:
             look: Where its camera looks.
             t: Time in the room [s]: who walks in it, and what stands.
         """
-        X_WR, place = upright(*posture), self._renderer.place
+        X_WR, lens = upright(*posture), self.lens
+        self._stand(posture, t)
+        self._renderer.place(self._body, X_WR)
+        return self._renderer.draw(
+            X_WR @ lens_pose(look, self._camera),
+            width=lens.width,
+            height=lens.height,
+            view=lens.view,
+            near=lens.near,
+            far=lens.far,
+        )
+
+    def above(self, posture: tuple[float, float, float], t: float, *, share: float = 1.0) -> Picture:
+        """Draw the room from above, without a ceiling: x to the right, y upwards.
+
+        Args:
+            posture: Where the robot is, x, y [m], θ [rad].
+            t: Time in the room [s].
+            share: Of the lens' width and height.
+        """
+        self._stand(posture, t)
+        if self._ceiling >= 0:
+            self._renderer.place(self._ceiling, None)
+        if self._looks is None:
+            self._renderer.place(self._body, upright(*posture))
+        else:
+            for figure, X_WS in zip(self._whole, self._looks.poses(posture), strict=True):
+                self._renderer.place(figure, X_WS)
+        width, height = round(share * self.lens.width), round(share * self.lens.height)
+        room, ratio = self._room, width / height
+        across, up = min(OVERHEAD_SPAN, room.length), min(OVERHEAD_SPAN / ratio, room.width)
+        middle = posture[:2]
+        if not self._endless:
+            middle = _within(posture[0], across, room.length), _within(posture[1], up, room.width)
+        highest = max((block.height for block in room.blocks), default=0.0)
+        away = highest + 0.5 * _SPARE * max(across, up * ratio) / math.tan(0.5 * OVERHEAD_VIEW)
+        X_WC = np.eye(4)
+        X_WC[:3, :3] = [[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]
+        X_WC[:3, 3] = *middle, away
+        return self._renderer.draw(
+            X_WC, width=width, height=height, view=OVERHEAD_VIEW, near=self.lens.near, far=away + 1.0
+        )
+
+    def both(self, posture: tuple[float, float, float], look: Look, t: float) -> Picture:
+        """Draw what the robot's camera sees, and the room from above in its corner; arguments as of `draw`."""
+        picture, inset = self.draw(posture, look, t), self.above(posture, t, share=_INSET)
+        height, width = inset.shape[:2]
+        picture[: height + 1, -width - 1 :] = 255
+        picture[:height, -width:] = inset
+        return picture
+
+    def _stand(self, posture: tuple[float, float, float], t: float) -> None:
+        """Put all there is where it stands at a time [s], but for the robot, which is away."""
+        place = self._renderer.place
+        if self._ceiling >= 0:
+            place(self._ceiling, np.eye(4))
+        for figure in (self._body, *self._whole):
+            place(figure, None)
         if self._endless:
             # By whole pairs of tiles: the floor seems to lie still.
             x, y = (2 * TILE * round(part / (2 * TILE)) for part in posture[:2])
@@ -201,16 +274,6 @@ class Sight:
             place(figure, upright(leaf.x, leaf.y, leaf.angle))
         for figure, person in self._people:
             place(figure, upright(*person.at(t), 0.0))
-        place(self._body, X_WR)
-        lens = self.lens
-        return self._renderer.draw(
-            X_WR @ lens_pose(look, self._camera),
-            width=lens.width,
-            height=lens.height,
-            view=lens.view,
-            near=lens.near,
-            far=lens.far,
-        )
 
     def _tile(self, low: tuple[float, float], high: tuple[float, float], side: float) -> int:
         """Lay a floor of tiles, light and dark in turn."""
@@ -233,7 +296,21 @@ class Sight:
         build = Builder("ceiling", _CEILING)
         z = max(walls)
         build.add(box((-0.1, -0.1, z), (self._room.length + 0.1, self._room.width + 0.1, z + 0.02)))
-        self._renderer.add(build.shape())
+        self._ceiling = self._renderer.add(build.shape())
+
+
+def jpeg(picture: Picture) -> bytes:
+    """A picture by itself, as JPEG, by Pillow."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=_QUALITY)
+    return file.getvalue()
+
+
+def _within(at: float, span: float, length: float) -> float:
+    """The middle nearest to a place of a span that lies within [0, length]."""
+    return min(max(at, 0.5 * span), length - 0.5 * span)
 
 
 def _tile_side(room: Room) -> float:

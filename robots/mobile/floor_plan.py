@@ -54,15 +54,7 @@ class FloorPlan:
         px, py, dx, dy = origins[:, :1], origins[:, 1:], directions[:, :1], directions[:, 1:]
         nearest = np.full(len(origins), np.inf)
         if self._names:
-            c, s = self._cos, self._sin
-            ox, oy = px - self._x, py - self._y
-            along, across = ox * c + oy * s, oy * c - ox * s
-            ux, uy = dx * c + dy * s, dy * c - dx * s
-            ux, uy = np.where(ux == 0, _TINY, ux), np.where(uy == 0, _TINY, uy)
-            with np.errstate(over="ignore"):
-                mx, my = along / ux, across / uy
-                hx, hy = self._half_x / np.abs(ux), self._half_y / np.abs(uy)
-            enter, leave = np.maximum(-mx - hx, -my - hy), np.minimum(hx - mx, hy - my)
+            enter, leave = self._slabs(origins, directions)
             hits = np.where((enter <= leave) & (leave >= 0), np.maximum(enter, 0.0), np.inf)
             nearest = hits.min(axis=1)
         if len(self._rx):
@@ -75,6 +67,38 @@ class FloorPlan:
             hits = np.where(over <= 0, 0.0, hits)
             nearest = np.minimum(nearest, hits.min(axis=1))
         return np.where(nearest <= reach, nearest, np.inf)
+
+    def _slabs(self, origins: Array, directions: Array) -> tuple[Array, Array]:
+        """Where rays enter and leave each block [m], (k, blocks); a ray misses those that it leaves before."""
+        px, py, dx, dy = origins[:, :1], origins[:, 1:], directions[:, :1], directions[:, 1:]
+        c, s = self._cos, self._sin
+        ox, oy = px - self._x, py - self._y
+        along, across = ox * c + oy * s, oy * c - ox * s
+        ux, uy = dx * c + dy * s, dy * c - dx * s
+        ux, uy = np.where(ux == 0, _TINY, ux), np.where(uy == 0, _TINY, uy)
+        with np.errstate(over="ignore"):
+            mx, my = along / ux, across / uy
+            hx, hy = self._half_x / np.abs(ux), self._half_y / np.abs(uy)
+        return np.maximum(-mx - hx, -my - hy), np.minimum(hx - mx, hy - my)
+
+    def crossed(self, start: tuple[float, float], end: tuple[float, float], t: float) -> Array:
+        """Return the thicknesses of the blocks that a line from one point to another passes through.
+
+        Args:
+            start: [m].
+            end: [m], elsewhere.
+            t: Time [s].
+
+        Returns:
+            The narrower side of each [m], (m,).
+        """
+        self._at(t)
+        p = np.array([start])
+        way = np.array([end]) - p
+        length = float(np.hypot(*way[0]))
+        enter, leave = self._slabs(p, way / length)
+        through = (enter <= leave) & (leave >= 0.0) & (enter <= length)
+        return np.asarray(2.0 * np.minimum(self._half_x, self._half_y)[through[0]])
 
     def clearance(self, x: float, y: float, t: float) -> float:
         """Return the distance from a point to the nearest thing [m], 0 inside of one, inf if nothing is there."""

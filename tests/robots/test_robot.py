@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 
 import robots
+from robots.mobile.chassis import Senses
 from robots.robot import EXACT, FOUND, IDEAL, Display, Gripper, HeadCamera, Robot, ThinClient
+from robots.rooms import read_room
 from robots.simulated import WORLDS, missing_for
 from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import MobileModel
@@ -48,6 +51,17 @@ def test_robots_carry_their_devices() -> None:
     thin = client.device(ThinClient)
     assert thin is not None
     assert thin.model.is_file()
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_a_bases_bodies_are_put_into_a_room_with_the_limits_and_senses_that_they_are_given(name: str) -> None:
+    robot, room = robots.load(name), read_room("room 1\nsize 4 4\nstart 1 2 0\n")
+    slow = replace(robot.base.limits, v_max=0.01)
+    for world in (world for world in WORLDS if not missing_for(world)):
+        rng = np.random.default_rng(0)
+        with robot.body(world)(room=room, rng=rng, senses=Senses(laser=None), limits=slow) as body:
+            assert body.truth == pytest.approx((1.0, 2.0, 0.0), abs=1e-3)
+            assert body.limits.v_max == 0.01
 
 
 def test_an_arms_bodies_follow_and_hold_loads() -> None:

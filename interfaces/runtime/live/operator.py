@@ -90,6 +90,8 @@ class LiveOperatorConfig:
     """Its camera; None for none, nor voice and screen."""
     arm: Callable[[ArmJob], float | str | None] = lambda _: None
     """Says of a program of the list how long it takes [s], why it'd fail, or None where nobody knows."""
+    in_order: bool = False
+    """Whether operators get control in the order in which they connect."""
 
 
 class LiveOperator(LeasedRobot, Workers):
@@ -137,7 +139,7 @@ class LiveOperator(LeasedRobot, Workers):
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)
-        hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9))
+        hub = HubConfig(rates=(), server=config.server, instance=secrets.token_urlsafe(9), in_order=config.in_order)
         self.emulation = LiveEmulation(self.line, self.robot, config.seed, self._rerouted)
         workers = self if which.is_base else None
         self.hub = Hub(

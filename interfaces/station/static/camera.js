@@ -16,7 +16,12 @@ const BUTTONS = [
   ["Look right", "keyboard_arrow_right", [-1, 0]],
   null, ["Look down", "keyboard_arrow_down", [0, -1]], null,
 ];
-
+/** What pictures are of, and what's said of them. */
+const VIEWS = {
+  robot: ["Robot", "What the robot's camera sees"],
+  overhead: ["Overhead", "The room from above"],
+  both: ["Both", "What the robot's camera sees, and the room from above"],
+};
 
 /** What is known of the camera, and what brings its picture. */
 class Camera {
@@ -30,6 +35,9 @@ class Camera {
       why: "",
       refused: "",
       muted: true,
+      view: "robot",
+      /** Whether the robot's microphone is heard, too. */
+      hears: false,
       /** Whether the picture comes by RTP. */
       byRtp: false,
     });
@@ -42,7 +50,7 @@ class Camera {
     video.muted = true;
     this.link = sideLink(this.station, "/media", { take: (data) => this.take(JSON.parse(data)), state: (state) => this.connected(state) });
     this.receiver = new Receiver(video, (message) => this.send(message), (why) => this.fallBack(why));
-    this.stills = new Stills(image, this.station.session);
+    this.stills = new Stills(image, this.station.session, () => this.view);
   }
 
   send(message) {
@@ -75,6 +83,7 @@ class Camera {
     if (state === "live") {
       this.single = false;
       this.receiver?.stop();
+      this.choose();
     }
     if (this.receiver) this.look();
   }
@@ -91,6 +100,18 @@ class Camera {
   listen() {
     this.muted = this.video.muted = !this.video.muted;
     this.look();
+  }
+
+  /** See and hear something else from now on. */
+  choose({ view = this.view, hears = this.hears } = {}) {
+    Object.assign(this, { view, hears });
+    this.send({ do: "choose", view, hears });
+  }
+
+  /** Listen to the robot's microphone, or no more. */
+  hear() {
+    this.choose({ hears: this.muted || !this.hears });
+    if (this.hears && this.muted) this.listen();
   }
 
   /** Say words aloud, show them, or clear what is shown. */
@@ -146,10 +167,13 @@ function Turn({ camera, entry: [label, symbol, way], why }) {
 function Stage({ station, camera }) {
   const [stage, video, image] = [useRef(null), useRef(null), useRef(null)];
   const [rate, setRate] = useState([0, 0]);
-  const { facts, byRtp, muted } = camera;
+  const { facts, byRtp, muted, view, hears } = camera;
+  const [, label] = VIEWS[view];
+  const toggle = (id, on, icon, text, shown, does) => html`<button class="small" type="button" id=${id} aria-pressed=${String(on)}
+    hidden=${!shown} onClick=${does}><${Icon} name=${icon} /><span>${text}</span></button>`;
   useEffect(() => {
     camera.begin(video.current, image.current);
-    camera.gaze.drag(stage.current);
+    camera.gaze.drag(stage.current, () => camera.view !== "overhead");
     camera.gaze.keys(KEYS, "KeyC", () => stage.current.offsetParent !== null);
     const look = () => camera.look();
     const seen = new IntersectionObserver(look);
@@ -165,16 +189,20 @@ function Stage({ station, camera }) {
   const [per, frames] = rate;
   const side = (x, more, less) => `${figure(Math.abs(x * DEGREES), 0)}° ${x >= 0 ? more : less}`;
   return html`<div class="stage" id="camera-stage" ref=${stage}>
-      <video id="camera-video" ref=${video} playsinline autoplay hidden=${!byRtp} aria-label="What the robot's camera sees" />
-      <img id="camera-still" ref=${image} alt="What the robot's camera sees" hidden=${byRtp} draggable=${false} />
+      <video id="camera-video" ref=${video} playsinline autoplay hidden=${!byRtp} aria-label=${label} />
+      <img id="camera-still" ref=${image} alt=${label} hidden=${byRtp} draggable=${false} />
       <p class="waiting" id="camera-wait" hidden=${per > 0 || frames > 0}>Waiting for the camera</p>
       <p class="caption" id="camera-saying" role="status" hidden=${!facts?.saying}>${facts?.saying ? `“${facts.saying}”` : ""}</p></div>
     <div class="row of-picture"><span class="rate" id="camera-rate" title="Pictures a second that arrive">
         ${per ? `${figure(per, 1)} pictures/s` : "no picture"}</span>
       <span class="muted" id="camera-angles">${facts && `${side(facts.pan, "left", "right")}, ${side(facts.tilt, "up", "down")}`}</span>
       <span class="grow"></span>
-      <button class="small" type="button" id="camera-sound" aria-pressed=${String(!muted)} hidden=${!byRtp} onClick=${() => camera.listen()}>
-        <${Icon} name=${muted ? "volume_off" : "volume_up"} /><span>${muted ? "Sound on" : "Sound off"}</span></button></div>`;
+      ${toggle("camera-sound", !muted, muted ? "volume_off" : "volume_up", muted ? "Sound on" : "Sound off", byRtp, () => camera.listen())}</div>
+    <div class="row"><select id="camera-view" aria-label="Which camera" value=${view}
+        onChange=${({ target }) => camera.choose({ view: target.value })}>
+        ${Object.entries(VIEWS).map(([name, [title]]) => html`<option value=${name}>${title}</option>`)}</select><span class="grow"></span>
+      <span class="muted" id="camera-level" hidden=${!facts?.microphone} title="At its microphone">${facts?.level == null ? "silent" : `${facts.level} dB`}</span>
+      ${toggle("camera-hear", hears && !muted, "mic", "Microphone", byRtp && facts.microphone, () => camera.hear())}</div>`;
 }
 
 /** What the robot's screen shows, over the 3D view. */

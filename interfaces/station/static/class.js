@@ -1,4 +1,4 @@
-// A class: who is here and who waits; for the teacher, how to join, and who gets control next.
+// Who is here and who waits for control; for the teacher of a class how to join; for admins, who gets control next.
 import { html, useEffect, useState } from "./ui.js";
 
 /** Codes are asked for again so long after they ran out [ms]. */
@@ -8,7 +8,7 @@ const DOES = { viewer: "watch", operator: "operate" };
 export function Panel({ station }) {
   const { session } = station;
   const teaches = session.welcome?.role === "admin";
-  return html`${teaches && html`<${Invitations} session=${session} />`}<${Present} session=${session} teaches=${teaches} />`;
+  return html`${teaches && station.config.codes && html`<${Invitations} session=${session} />`}<${Present} station=${station} teaches=${teaches} />`;
 }
 
 /** The codes in force, and their links as pictures. */
@@ -34,12 +34,12 @@ function Invitations({ session }) {
       <figcaption>To ${DOES[role]}<strong class="code">${code}</strong><a href=${link}>${link}</a></figcaption></figure>`)}</div></section>`;
 }
 
-function Present({ session, teaches }) {
+function Present({ station: { session, config }, teaches }) {
   const { present, lease } = session;
   if (!present) return null;
   const { members = [], others = 0, holder, offered } = present;
   const standing = ({ number, waiting, role }) => (number === holder ? "has control" : number === offered ? "may take control"
-    : waiting ? `waits, number ${waiting}` : role === "viewer" ? "watches" : role === "admin" ? "teaches" : "");
+    : waiting ? `waits, number ${waiting}` : role === "viewer" ? "watches" : role === "admin" ? (config.codes ? "teaches" : "may take over") : "");
   const act = (type, member, id, text, label) => html`<button class="small" type="button" data-do=${id} aria-label=${label}
     onClick=${() => session.wish(type, { member })}>${text}</button>`;
   return html`<section><div class="head"><h2>Here</h2><span class="hint">${members.length + others}</span></div>

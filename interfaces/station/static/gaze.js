@@ -75,11 +75,11 @@ export class Gaze {
     this.target = null;
   }
 
-  /** Let who drags an element with the picture in it drag what is seen. */
-  drag(stage) {
+  /** Let who drags an element with the picture in it drag what is seen, while that's of use. */
+  drag(stage, isUsed) {
     let last = null;
     stage.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0 || !this.may()) return;
+      if (event.button !== 0 || !isUsed() || !this.may()) return;
       stage.setPointerCapture(event.pointerId);
       last = { at: [event.clientX, event.clientY], target: this.facts().target };
     });

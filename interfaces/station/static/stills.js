@@ -6,10 +6,12 @@ export class Stills {
   /**
    * @param {HTMLImageElement} image where they're shown
    * @param {object} session knows the token
+   * @param {function(): string} view says what's to be seen
    */
-  constructor(image, session) {
+  constructor(image, session, view) {
     this.image = image;
     this.session = session;
+    this.view = view;
     this.wanted = false;
     /** Pictures that were shown. */
     this.frames = 0;
@@ -35,7 +37,7 @@ export class Stills {
   }
 
   async fetch() {
-    const answer = await this.session.fetch("/media/still");
+    const answer = await this.session.fetch(`/media/still?view=${this.view()}`);
     this.rate = answer.ok ? 1000 / PERIOD : 0;
     if (!answer.ok) return;
     const before = this.image.src;

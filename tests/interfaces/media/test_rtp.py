@@ -55,6 +55,37 @@ def test_pictures_and_words_arrive_and_a_page_that_closes_takes_its_peer_along()
     asyncio.run(session())
 
 
+def test_who_wants_to_hears_the_room_as_loud_as_it_is_and_sees_it_from_above() -> None:
+    async def session() -> tuple[float, float]:
+        async with site() as here, here.page() as page, here.page() as other:
+            facts = await page.hear("media")
+            assert (facts["microphone"], facts["level"]) == (True, 70)
+            viewer, quiet = await Viewer().watch(page), await Viewer().watch(other)
+            await until(lambda: bool(viewer.pictures) and wood(viewer.pictures[-1]), 60.0)
+            assert max(viewer.levels, default=0.0) == 0.0
+            await page.say(do="choose", view="overhead", hears=True)
+            await until(lambda: not wood(viewer.pictures[-1]), 60.0)
+            await until(lambda: max(viewer.levels) > 1000)
+            heard = len(viewer.levels)
+            await until(lambda: len(viewer.levels) > heard + 60)
+            assert wood(quiet.pictures[-1])
+            await page.say(do="choose", view="robot", hears=False)
+            await until(lambda: wood(viewer.pictures[-1]))
+            await until(lambda: max(viewer.levels[-5:]) == 0.0)
+            await page.say(do="choose", view="sideways")
+            assert "robot, overhead, both" in (await page.hear("problem"))["text"]
+            found = max(viewer.levels[heard:]), max(quiet.levels)
+            await viewer.close()
+            await quiet.close()
+            return found
+
+    loudest, others = asyncio.run(session())
+    # 6 dB less at 2 m; 85 dB are a full sine, and a swell's top is 2/√¾ of its root mean square, which is over √½.
+    full = 32767 * 10 ** ((76 - 6.02 - 85) / 20) / 2**0.5
+    assert loudest == pytest.approx(full * 2 / 0.75**0.5, rel=0.1)
+    assert others == 0.0
+
+
 def test_who_may_come_in_and_what_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "MOST_PEERS", 1)
 
@@ -82,6 +113,7 @@ def test_who_may_come_in_and_what_is_answered(monkeypatch: pytest.MonkeyPatch) -
                 assert "pan must be" in await refused(one, do="aim", pan=2.0, tilt=0.0, **SURE)
                 assert "text must be" in await refused(one, do="show", text="", **SURE)
                 assert "do must be" in await refused(one, do="dance", **SURE)
+                assert (await here.still(view="sideways"))[0] == 400
                 for text in ("[1]", '{"do":5}', "no JSON", "{}"):
                     await one.socket.send(text)
                     assert "known here" in (await one.hear("problem"))["text"]
@@ -136,6 +168,7 @@ def test_without_the_extra_there_are_single_pictures_and_a_camera_that_fails_is_
             status, kind, data = await still
             assert (status, kind) == (200, "image/jpeg")
             assert wood(picture_of(data))
+            assert not wood(picture_of((await here.still(view="overhead"))[2]))
             assert not here.media.camera.wanted
             await page.say(do="speak", text="Hello!", **SURE)
             await page.hear("media", saying="Hello!")

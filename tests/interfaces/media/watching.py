@@ -22,8 +22,8 @@ from robots.mobile.camera import Lens
 from robots.rooms import read_room
 from vrs.clock import WallClock
 
-ROOM = read_room("room 1\nsize 6 6\nwall 6 0  6 6\nbox 5 3  0.5 3 height=2\n")
-"""A wooden cupboard before the robot."""
+ROOM = read_room("room 1\nsize 6 6\nwall 6 0  6 6\nbox 5 3  0.5 3 height=2\nsound 2 5 level=76 pitch=500\n")
+"""A wooden cupboard before the robot, and something to hear 2 m to its left."""
 KEY, EPOCH = "a-session", 7
 LENS = Lens(width=160, height=120)
 VIEWER, OPERATOR = "v" * 43, "o" * 43
@@ -36,10 +36,10 @@ class Site:
         self.media, self.port = media, port
         self.url = f"127.0.0.1:{port}"
 
-    async def still(self, token: str | None = VIEWER) -> tuple[int, str, bytes]:
+    async def still(self, token: str | None = VIEWER, view: str = "robot") -> tuple[int, str, bytes]:
         """Ask for a single picture: status, media type and body of the answer."""
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        request = urllib.request.Request(f"http://{self.url}/media/still", headers=headers)
+        request = urllib.request.Request(f"http://{self.url}/media/still?view={view}", headers=headers)
 
         def ask() -> tuple[int, str, bytes]:
             try:

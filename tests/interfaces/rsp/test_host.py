@@ -12,11 +12,11 @@ from interfaces.rsp.errors import DeadlineError
 from interfaces.rsp.host import MOST_BEHIND, RspHost, packed
 from interfaces.rsp.local import LocalCore, LocalState
 from interfaces.rsp.middleware import Middleware
-from interfaces.rsp.model import Effector, Event, OnLoss, RobotModel, Sensor
+from interfaces.rsp.model import Effector, Event, MemoryEvent, OnLoss, RobotModel, Sensor
 from interfaces.rsp.robot import RobotCore
 from vrs.clock import ManualClock
 
-WHEEL, LAMP, SPEAKER, RANGE, NONE, BUMPER = range(6)
+WHEEL, LAMP, SPEAKER, RANGE, NONE, BUMPER, PICTURE = range(7)
 MODEL = RobotModel(
     "stub",
     1,
@@ -27,6 +27,7 @@ MODEL = RobotModel(
         Sensor("range", type="u16", scale=0.01, binding="range"),
         Sensor("none", count=2),
         Event("bumper", scale=0.5, binding="bumper"),
+        MemoryEvent("picture", size=20, binding="camera"),
     ),
 )
 
@@ -40,6 +41,7 @@ class Stub:
         self.moved: list[tuple[str, tuple[float, ...]]] = []
         self.heard: list[bytes | None] = []
         self.happened: list[str] = []
+        self.remembered: list[tuple[str, bytes]] = []
         self.resting, self.range, self.steps = True, 1.234, 0
 
     def move(self, binding: str, values: tuple[float, ...]) -> None:
@@ -56,6 +58,10 @@ class Stub:
 
     def events(self) -> list[str]:
         found, self.happened = self.happened, []
+        return found
+
+    def memories(self) -> list[tuple[str, bytes]]:
+        found, self.remembered = self.remembered, []
         return found
 
     def go_on(self, steps: int = 1) -> None:
@@ -141,6 +147,19 @@ def test_sensors_and_events_are_told_and_one_without_a_body_says_0() -> None:
     site.run(0.2)
     assert local.payload(RANGE) == (2, (50).to_bytes(2, "big"))
     assert local.came(BUMPER) == (2).to_bytes(2, "big")
+
+
+def test_what_the_body_remembers_comes_once_and_what_has_no_place_or_receiver_is_left_out(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    site = Site()
+    site.body.remembered.append(("camera", b"to nobody"))
+    site.run(0.1)
+    local = site.local(b"one")
+    site.body.remembered += [("camera", b"one"), ("ear", b"unknown"), ("camera", b"x" * 21), ("camera", b"two")]
+    site.run(1.0)
+    assert [local.came(PICTURE) for _ in range(3)] == [b"one", b"two", None]
+    assert "a memory event of picture is left out" in caplog.text
 
 
 def test_the_body_keeps_to_the_time_and_plays_a_fragment_each_20_ms() -> None:

@@ -1,4 +1,4 @@
-"""A mobile robot's page: each panel's style sheet dresses its own, and a refusal is said at the control."""
+"""A mobile robot's page: styles and refusals where they belong, the room from above and by ear, people in order."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ import pytest
 
 from tests.interfaces.live_rig import Child, child
 from tests.interfaces.station.opened import Page, paged, station
+from tests.interfaces.station.test_class import standing
+from tests.interfaces.station.test_driving import CAMERA, LISTEN
 from tests.interfaces.station.test_notices import told
 
-SERVE = ("serve", "--robot", "ipr", "--link-loss", "hold", "--port", "0")
+SERVE = ("serve", "--robot", "ipr", "--room", "home", "--in-order", "--link-loss", "hold", "--port", "0")
 OWNERS = {
     "camera.css": ["camera"],
     "driving.css": ["drive", "plots", "floor"],
@@ -91,3 +93,53 @@ def test_what_is_refused_is_said_where_the_hand_is(page: Page) -> None:
     told(page, "no place of this list", "#job-add-it")
     page.page.keyboard.press("Escape")
     page.wait("document.getElementById('notice').hidden")
+
+
+CORNER = f"""() => {{
+  const {{ video }} = {CAMERA};
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
+  const context = canvas.getContext("2d");
+  context.drawImage(video, 0, 0);
+  return [...context.getImageData(3, canvas.height / 2, 1, 1).data].slice(0, 3);
+}}"""
+"""Colour at the left edge of the newest picture."""
+
+
+def test_the_room_is_seen_from_above_and_heard_by_who_wants_to(page: Page) -> None:
+    page.page.click("#tab-camera")
+    page.wait(f"{CAMERA}.receiver.rate >= 3", 90.0)
+    page.page.select_option("#camera-view", "overhead")
+    # Beside the room there's nothing but a light blue.
+    page.until(lambda: (lambda r, _, b: b > r + 10)(*page.page.evaluate(CORNER)))
+    assert page.page.locator("#camera-video").get_attribute("aria-label") == "The room from above"
+    page.page.evaluate(LISTEN)
+    page.wait("level() === 0")
+    assert page.get(f"{CAMERA}.facts.level") > 0
+    page.page.click("#camera-hear")
+    page.wait("level() > 0.0003")
+    assert not page.get(f"{CAMERA}.video.muted")
+    page.page.click("#camera-hear")
+    page.wait("level() === 0")
+    page.page.select_option("#camera-view", "both")
+    page.until(lambda: not (lambda r, _, b: b > r + 10)(*page.page.evaluate(CORNER)))
+    page.shoot("camera-both")
+
+
+@pytest.mark.slow
+def test_who_connects_first_has_control_first_and_then_it_is_the_next_ones_turn(
+    browser: Any, server: Child, page: Page
+) -> None:
+    page.take_control()
+    with paged(browser, station(server)) as other:
+        other.open()
+        other.wait("document.getElementById('control-pill').textContent.includes('number 1 in the queue')")
+        assert other.page.locator("#take").is_hidden()
+        other.page.click("#tab-class")
+        other.until(lambda: "waits, number 1" in standing(other, other.get("station.session.name")))
+        assert other.page.locator(".invitations").count() == 0
+        other.accessible()
+        page.page.click("#give")
+        other.wait("document.getElementById('control-pill').textContent.includes('your turn')")
+        other.take_control()
+        page.wait("document.getElementById('ask').hidden === false")

@@ -446,6 +446,49 @@ def test_a_program_of_this_process_has_no_number_and_waits_as_others():
     assert lesson.hub.leasing.wish(seat, Acquire(3), 0.7).code is ProblemCode.LEASE
 
 
+# In the order in which they connect.
+
+
+def test_in_order_the_first_to_connect_is_offered_control_and_then_the_next():
+    hub = make_hub(in_order=True)
+    ada, eve = Pupil(hub, name="Ada"), Pupil(hub, name="Eve", role=Role.VIEWER, now=0.1)
+    bo, cy = Pupil(hub, name="Bo", now=0.2), Pupil(hub, name="Cy", now=0.3)
+    assert told(ada, eve, bo, cy, now=0.4) == ["offered", 0, 2, 3]
+    assert hub.lease_state is LeaseState.FREE, "nobody has it who hasn't asked"
+    assert bo.ask(Acquire, now=0.5).code is ProblemCode.LEASE
+    epoch = ada.ask(Acquire, now=0.6).epoch
+    assert told(ada, eve, bo, cy, now=0.7) == ["has it", 0, 1, 2]
+    assert [member.name for member in ada.ask(Who, now=0.8).members] == ["Ada", "Bo", "Cy", "Eve"]
+    order = ada.tell(Order(1, to(1), epoch), now=0.9)
+    assert next(m for m in order if m.kind == "outcome").refusal == ""
+    ada.leave(now=1.0)
+    # Its lease runs out, the robot stops, and the next one's turn has come.
+    assert told(bo, cy, now=3.0) == ["offered", 2]
+    assert hub.robot.log[-1][0] == "ended"
+    assert bo.ask(Acquire, now=3.1).yours
+
+
+def test_in_order_who_lets_it_pass_or_gives_it_back_waits_behind_the_others_when_asking_again():
+    hub = make_hub(in_order=True)
+    ada, bo, cy = (Pupil(hub, name=name) for name in ("Ada", "Bo", "Cy"))
+    ada.look(now=0.1)
+    late = 0.1 + OFFERED
+    assert told(ada, bo, cy, now=late) == [0, "offered", 2]
+    epoch = bo.ask(Acquire, now=late).epoch
+    assert ada.ask(RequestControl, now=late).waiting == 2
+    bo.ask(Release, epoch, now=late + 0.1)
+    assert told(ada, bo, cy, now=late + 0.2) == [2, 0, "offered"]
+
+
+def test_in_order_an_admin_takes_over_and_waits_for_nobody():
+    hub = make_hub(in_order=True)
+    admin, ada = Pupil(hub, name="Root", role=Role.ADMIN, token=ADMIN), Pupil(hub, name="Ada", now=0.1)
+    assert told(admin, ada, now=0.2) == [0, "offered"]
+    ada.ask(Acquire, now=0.3)
+    admin.ask(TakeOver, now=0.4)
+    assert told(admin, ada, now=0.5) == ["has it", 0]
+
+
 # Whatever they do.
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robots.base import upright
-from robots.mobile.camera import Lens, Look, Sight, lens_pose
+from robots.mobile.camera import OVERHEAD_VIEW, Lens, Look, Sight, lens_pose
 from robots.mobile.renderer import SKY, Picture
 from robots.robot import HeadCamera, load
 from robots.rooms import EMPTY, read_room
@@ -118,3 +118,51 @@ def test_walls_carry_a_ceiling() -> None:
     sight = Sight(room, CAMERA, LENS)
     picture = sight.draw((2.0, 2.0, 0.0), Look(0.0, 0.7), 0.0)
     assert not (picture == SKY).all(axis=-1).any()
+
+
+def test_from_above_all_is_where_the_map_has_it_and_the_ceiling_is_open() -> None:
+    room = read_room(
+        "room 1\nsize 8 6\nwall 0 0  8 0\nwall 8 0  8 6\nwall 8 6  0 6\nwall 0 6  0 0\n"
+        "box 6 4.5  0.8 0.4 height=0.01\nperson 0.25  0,2,5  10,6,5\n"
+    )
+    robot = load("ipr")
+    sight = Sight(room, CAMERA, LENS, robot.appearance)
+    picture = sight.above((2.0, 1.5, 0.7), 5.0)
+    # The floor is so far below that 8 m and a twentieth, seen at the height of the walls, fill the picture.
+    away = 0.5 * 1.05 * 8.0 / math.tan(OVERHEAD_VIEW / 2) + 2.4
+    scale = LENS.width / 2 / math.tan(OVERHEAD_VIEW / 2) / away
+
+    def pixel(x: float, y: float) -> tuple[float, float]:
+        return LENS.width / 2 + scale * (x - 4.0), LENS.height / 2 - scale * (y - 3.0)
+
+    rows, columns = np.nonzero(where(picture, "wood"))
+    assert (columns.mean() + 0.5, rows.mean() + 0.5) == pytest.approx(pixel(6.0, 4.5), abs=1.0)
+    assert len(rows) == pytest.approx(scale**2 * 0.8 * 0.4, rel=0.15)
+    # From the middle who walks leans away to both sides alike.
+    upper = [sight.above((2.0, 1.5, 0.7), t)[: LENS.height // 2] for t in (2.5, 5.0, 7.5)]
+    walker = [np.nonzero(where(half, "cloth"))[1].mean() + 0.5 for half in upper]
+    assert walker[1] == pytest.approx(pixel(4.0, 0.0)[0], abs=1.0)
+    assert walker[0] + walker[2] == pytest.approx(2 * walker[1], abs=2.0)
+    assert scale < walker[2] - walker[1] < 1.25 * scale
+    alone = sight.above((6.0, 1.5, 0.7), 5.0)
+    rows, columns = np.nonzero((picture != alone).any(axis=-1))
+    assert (columns.min(), columns.max()) == pytest.approx((pixel(1.75, 0)[0], pixel(6.25, 0)[0]), abs=6.0)
+    assert rows.mean() == pytest.approx(pixel(0.0, 1.5)[1], abs=3.0)
+
+
+def test_the_picture_of_both_is_the_robots_with_the_room_in_its_corner(sight: Sight) -> None:
+    posture = (2.0, 5.0, 0.3)
+    alone, above, both = (
+        sight.draw(posture, AHEAD, 0.0), sight.above(posture, 0.0, share=0.4), sight.both(posture, AHEAD, 0.0)
+    )  # fmt: skip
+    assert (both[:72, -96:] == above).all()
+    assert (both[73:] == alone[73:]).all()
+    assert (both[:, :-97] == alone[:, :-97]).all()
+
+
+def test_of_a_hall_it_shows_what_is_about_the_robot() -> None:
+    hall = read_room("room 1\nsize 100 100\nbox 51 50  0.4 0.4 height=0.01\n")
+    sight = Sight(hall, CAMERA, LENS)
+    near, far = (where(sight.above((x, 50.0, 0.0), 0.0), "wood") for x in (50.0, 70.0))
+    assert near.any()
+    assert not far.any()
