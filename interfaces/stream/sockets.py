@@ -418,6 +418,14 @@ def let_stay(scope: Scope, *, known: bool) -> None:
         connection.let_stay(known=known)
 
 
+def tls_version(scope: Scope) -> str:
+    """The version of TLS that an application's WebSocket comes by, as in `TLSv1.3`; empty for none."""
+    connection = scope.get("state", {}).get("socket")
+    transport = connection.transport if isinstance(connection, BoundedWebSocket) else None
+    spoken = None if transport is None else transport.get_extra_info("ssl_object")
+    return "" if spoken is None else str(spoken.version())
+
+
 def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
     """Make a listening socket with small buffers, which its connections inherit.
 
