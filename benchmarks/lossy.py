@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterator
 from random import Random
 from typing import TypeVar
 
+from interfaces.system import hasten
+
 OPERATOR, ROBOT = "10.213.58.1", "10.213.58.2"
 """Addresses; they exist in the namespaces alone."""
 _NEWNET = 0x40000000
@@ -92,6 +94,7 @@ def lossy_kernels(listen: Callable[[], T], loss: float, delay: float, seed: int)
     child = os.fork()
     if not child:
         try:
+            hasten(2)
             _carry({operator: robot, robot: operator}, loss, delay, Random(seed))  # noqa: S311
         finally:
             os._exit(0)

@@ -18,6 +18,7 @@ from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
+from websockets.exceptions import InvalidState
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
@@ -359,6 +360,12 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         if self.response.status_code == 101:
             self.scope["state"]["socket"] = self
 
+    def shutdown(self) -> None:
+        """End the connection, as the server does; it may be ending already, by the other end's farewell."""
+        with contextlib.suppress(InvalidState):
+            super().shutdown()
+        self.transport.close()
+
     def on_task_complete(self, task: asyncio.Task[None]) -> None:
         """The application is done: what is left ends soon."""
         super().on_task_complete(task)
@@ -508,6 +515,8 @@ async def serve(
         asyncio.get_running_loop().call_later(_GRACE, _abort_all, connections)
         await task
         _abort_all(connections)
+        # Sockets are closed in the round after.
+        await asyncio.sleep(0)
 
 
 @contextlib.asynccontextmanager

@@ -27,6 +27,9 @@ from interfaces.runtime.live.datagrams import (
     ALONE,
     BURST,
     LONGEST,
+    PARTIAL,
+    PIECE,
+    PIECES,
     ROOM,
     DatagramSocket,
     DatagramState,
@@ -90,8 +93,8 @@ class Sites:
                     self.at_robot(delivery.payload)
             for delivery in self.beside[0].receive(self.t):
                 message, answer = self.theirs.take(delivery.payload, HERE)
-                if answer is not None:
-                    self.beside[1].send(answer, self.t)
+                for datagram in answer:
+                    self.beside[1].send(datagram, self.t)
                 if message:
                     self.at_robot(message)
             for answer in self.host.advance(now=self.t + self.ahead):
@@ -103,12 +106,11 @@ class Sites:
                 if message := self.mine.take(delivery.payload):
                     self.at_operator(message)
 
-    def put(self, way: int, data: bytes, seal: Callable[[bytes], bytes | None]) -> None:
+    def put(self, way: int, data: bytes, seal: Callable[[bytes], list[bytes]]) -> None:
         self.stream[way].send(data, self.t)
-        sealed = seal(data) if self.datagrams else None
-        if sealed is not None:
-            assert len(sealed) <= LONGEST
-            self.beside[way].send(sealed, self.t)
+        for datagram in seal(data) if self.datagrams else ():
+            assert len(datagram) <= LONGEST
+            self.beside[way].send(datagram, self.t)
 
     def at_robot(self, data: bytes) -> None:
         message = decode(data, Encoding.MSGPACK, allowed=Orders | Pong)
@@ -259,8 +261,7 @@ def pair() -> tuple[OperatorDatagrams, RobotDatagrams]:
 
 
 def seal(end: OperatorDatagrams | RobotDatagrams, message: bytes) -> bytes:
-    sealed = end.seal(message)
-    assert sealed is not None
+    (sealed,) = end.seal(message)
     return sealed
 
 
@@ -270,7 +271,7 @@ def test_a_datagram_counts_once_and_only_as_it_was_made() -> None:
     for k in range(len(good)):
         flipped = bytearray(good)
         flipped[k] ^= 1 << k % 8
-        assert robot.take(bytes(flipped), HERE) == (b"", None)
+        assert robot.take(bytes(flipped), HERE) == (b"", [])
     for other in (
         b"",
         good[:51],
@@ -279,52 +280,73 @@ def test_a_datagram_counts_once_and_only_as_it_was_made() -> None:
         bytes(LONGEST + 1),
         seal(OperatorDatagrams("x" * 43), b"orders"),
     ):
-        assert robot.take(other, HERE) == (b"", None)
+        assert robot.take(other, HERE) == (b"", [])
     assert operator.take(good) == b"", "sent back to where it came from"
     assert robot.address is None
     assert robot.take(good, HERE)[0] == b"orders"
-    assert robot.take(good, HERE) == (b"", None)
+    assert robot.take(good, HERE) == (b"", [])
     assert robot.take(seal(operator, b"orders"), HERE)[0] == b"", "a copy in a datagram of its own"
     assert robot.came == 2
 
 
 def test_none_is_longer_than_1200_bytes() -> None:
     operator, robot = pair()
-    assert len(seal(operator, bytes(ROOM))) == LONGEST
-    assert operator.seal(bytes(ROOM + 1)) is None
     prove(operator, robot)
-    assert len(seal(robot, bytes(ROOM))) == LONGEST
-    assert robot.seal(bytes(ROOM + 1)) is None
+    for end in (operator, robot):
+        assert [len(datagram) for datagram in end.seal(bytes(ROOM))] == [LONGEST] * PIECES
+        assert [len(datagram) for datagram in end.seal(bytes(PIECE))] == [LONGEST]
+        assert end.seal(bytes(ROOM + 1)) == []
+
+
+@pytest.mark.parametrize("lost", [None, 0, 2])
+def test_pieces_make_a_message_in_whatever_order_they_come(lost: int | None) -> None:
+    operator, robot = pair()
+    message, other = bytes(range(256)) * 12, b"\1" * 2 * PIECE
+    pieces = [*operator.seal(message), *operator.seal(other)]
+    assert len(pieces) == 5
+    if lost is not None:
+        del pieces[lost]
+    came = [robot.take(pieces[k], HERE)[0] for k in (*range(len(pieces))[::-1], *range(len(pieces)))]
+    assert sorted(filter(None, came)) == sorted([other] if lost is not None else [message, other])
+    assert robot.streamed(message) is (lost is not None)
+
+
+def test_pieces_of_the_newest_messages_alone_are_kept() -> None:
+    operator, robot = pair()
+    first, last = operator.seal(bytes(2 * PIECE))
+    robot.take(first, HERE)
+    for k in range(PARTIAL):
+        robot.take(operator.seal(b"%02d" % k + bytes(PIECE))[0], HERE)
+    assert len(robot._partial) == PARTIAL
+    assert robot.take(last, HERE)[0] == b""
 
 
 def prove(operator: OperatorDatagrams, robot: RobotDatagrams) -> None:
     for k in range(2):
         _, answer = robot.take(seal(operator, b"prove %d" % k), HERE)
-        if answer is not None:
-            assert operator.take(answer) == b""
+        for datagram in answer:
+            assert operator.take(datagram) == b""
     assert robot.address == HERE
 
 
 def test_nothing_longer_than_what_came_goes_to_an_address_before_it_is_proven() -> None:
     operator, robot = pair()
     first = seal(operator, b"")
-    message, answer = robot.take(first, ELSEWHERE)
+    message, (answer,) = robot.take(first, ELSEWHERE)
     assert message == b""
-    assert answer is not None
     assert len(answer) <= len(first)
     assert robot.address is None
-    assert robot.seal(b"a report") is None
+    assert robot.seal(b"a report") == []
     # Whoever sends on what was caught has no cookie for where it sends it from.
     prove(operator, robot)
     caught = seal(operator, b"orders")
-    message, answer = robot.take(caught, ELSEWHERE)
+    message, (answer,) = robot.take(caught, ELSEWHERE)
     assert message == b"orders"
-    assert answer is not None
     assert len(answer) <= len(caught)
     assert robot.address == HERE
     # An operator whose address has changed, as by a NAT, is sent to again when it has brought the new cookie.
     assert operator.take(answer) == b""
-    assert robot.take(seal(operator, b"from elsewhere"), ELSEWHERE) == (b"from elsewhere", None)
+    assert robot.take(seal(operator, b"from elsewhere"), ELSEWHERE) == (b"from elsewhere", [])
     assert robot.address == ELSEWHERE
 
 
@@ -435,6 +457,7 @@ class Stranger:
         made = HKDF(SHA256(), 84, b"", b"vrs datagrams 1").derive(self.attached["datagrams"].encode())
         self.id, self.there, self.back = made[:20], AESGCM(made[20:52]), AESGCM(made[52:])
         self.cookie = bytes(8)
+        self.pieces: dict[tuple[int, int], bytes] = {}
         self.udp = socket.socket(type=socket.SOCK_DGRAM)
         self.udp.connect(("127.0.0.1", port))
         self.udp.settimeout(0.2)
@@ -447,7 +470,7 @@ class Stranger:
         self.stream.send(text)
         self.number += 1
         count = self.number.to_bytes(8, "big")
-        sealed = self.there.encrypt(bytes(4) + count, self.cookie + text.encode(), self.id)
+        sealed = self.there.encrypt(bytes(4) + count, self.cookie + bytes((0, 1)) + text.encode(), self.id)
         self.udp.send(self.id + count + sealed)
 
     def datagrams(self) -> Iterator[dict[str, Any]]:
@@ -458,9 +481,12 @@ class Stranger:
                 return
             assert len(data) <= 1200
             body = self.back.decrypt(bytes(4) + data[20:28], data[28:], data[:20])
-            self.cookie = body[:8]
-            if body[8:]:
-                yield json.loads(body[8:])
+            self.cookie, (k, pieces) = body[:8], body[8:10]
+            first = int.from_bytes(data[20:28], "big") - k
+            self.pieces[first, k] = body[10:]
+            message = [self.pieces.get((first, k), b"") for k in range(pieces)]
+            if pieces and all(message):
+                yield json.loads(b"".join(message))
 
 
 def test_a_stranger_sends_and_takes_them_by_the_document() -> None:

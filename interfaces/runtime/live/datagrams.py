@@ -1,8 +1,9 @@
-"""Datagrams beside the stream between the sites: what fits in one crosses by both ways, and the first copy counts.
+"""Datagrams beside the stream between the sites: what fits in four crosses both ways, and the first copy counts.
 
 A datagram is 1200 bytes at most: an id (20 bytes, in the clear and authenticated), a counter (8), and, sealed by
-AES-256-GCM with a tag of 16 bytes, a cookie (8) and a message as it stands on the stream. Keys and id are made of a
-secret that the robot's site tells on the stream, new for each connection.
+AES-256-GCM with a tag of 16 bytes, a cookie (8), which piece of how many it is (1 each), and that piece of a
+message as it stands on the stream. Keys and id are made of a secret that the robot's site tells on the stream, new
+for each connection.
 
 A robot's site sends messages to an address only after somebody there has brought back the cookie that it had sent
 there. Until then each datagram is answered by one that holds the cookie alone, the shortest that there is.
@@ -11,17 +12,18 @@ there. Until then each datagram is answered by one that holds the cookie alone, 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import enum
 import hashlib
 import hmac
 import secrets
 import socket
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple
 
 from interfaces.rsp import header
-from interfaces.rsp.session import OVERHEAD, PacketCipher, PacketDropped, hkdf
+from interfaces.rsp.session import OVERHEAD, DropReason, PacketCipher, PacketDropped, hkdf
 from interfaces.stream.limits import Bucket
 
 LONGEST: Final = 1200
@@ -30,8 +32,14 @@ COOKIE: Final = 8
 """Of a cookie [byte]."""
 ID: Final = header.SIZE
 """Of what a connection's datagrams begin with [byte]: as long as the header that `PacketCipher` seals."""
-ROOM: Final = LONGEST - ID - OVERHEAD - COOKIE
-"""Longest message in a datagram [byte]."""
+PIECE: Final = LONGEST - ID - OVERHEAD - COOKIE - 2
+"""Longest piece of a message in a datagram [byte]."""
+PIECES: Final = 4
+"""Pieces of a message, at most: their counters follow one another."""
+ROOM: Final = PIECES * PIECE
+"""Longest message that's sent in datagrams [byte]; longer ones have the stream."""
+PARTIAL: Final = 16
+"""Messages of which some pieces have come, that are kept."""
 REMEMBERED: Final = 8192
 """Messages of which copies are known: those of over two minutes."""
 ALONE: Final = 64
@@ -79,6 +87,7 @@ class _End:
     def __init__(self, name: bytes, sending: bytes, receiving: bytes) -> None:
         self._id, self._cipher, self._count = name, PacketCipher(sending, receiving), 0
         self._known: OrderedDict[bytes, None] = OrderedDict()
+        self._partial: OrderedDict[int, dict[int, bytes]] = OrderedDict()
         self._alone = 0
         self.came = self.dropped = 0
         """Datagrams that counted; those that were forged, changed, of another connection, too long, or repeated."""
@@ -105,24 +114,46 @@ class _End:
             self._known.popitem(last=False)
         return True
 
-    def _seal(self, cookie: bytes, message: bytes) -> bytes:
-        self._count += 1
-        return self._cipher.seal(self._id, cookie + message, self._count)
+    def _seal(self, cookie: bytes, message: bytes) -> list[bytes]:
+        """The datagrams of a message; one without a piece where it's empty, none where it's too long."""
+        pieces = -(-len(message) // PIECE)
+        if pieces > PIECES:
+            return []
+        sealed = []
+        for k in range(pieces or 1):
+            self._count += 1
+            body = cookie + bytes((k, pieces)) + message[k * PIECE : (k + 1) * PIECE]
+            sealed.append(self._cipher.seal(self._id, body, self._count))
+        return sealed
 
     def _open(self, datagram: bytes) -> tuple[bytes, bytes] | None:
-        """Cookie and message of a datagram that's authentic and new."""
-        if len(datagram) <= LONGEST and datagram[:ID] == self._id:
-            try:
-                body, _ = self._cipher.open(datagram)
-            except PacketDropped:
-                pass
-            else:
-                if len(body) >= COOKIE:
-                    self.came, self._alone = self.came + 1, 0
-                    cookie, message = body[:COOKIE], body[COOKIE:]
-                    return cookie, message if message and self._is_new(message) else b""
-        self.dropped += 1
-        return None
+        """The cookie of a datagram that's authentic and new, and the message if that's new and complete with it."""
+        try:
+            if len(datagram) > LONGEST or datagram[:ID] != self._id:
+                raise PacketDropped(DropReason.SESSION)
+            body, count = self._cipher.open(datagram)
+            if len(body) < COOKIE + 2 or body[COOKIE + 1] > PIECES:
+                raise PacketDropped(DropReason.MALFORMED)
+        except PacketDropped:
+            self.dropped += 1
+            return None
+        self.came, self._alone = self.came + 1, 0
+        k, pieces = body[COOKIE : COOKIE + 2]
+        message = self._joined(count - k, k, pieces, body[COOKIE + 2 :])
+        return body[:COOKIE], message if message and self._is_new(message) else b""
+
+    def _joined(self, first: int, k: int, pieces: int, piece: bytes) -> bytes:
+        """The message that its k-th piece completes, or nothing; `first` is the counter of its first piece."""
+        if pieces <= 1:
+            return piece
+        known = self._partial.setdefault(first, {})
+        known[k] = piece
+        if len(known) < pieces:
+            if len(self._partial) > PARTIAL:
+                self._partial.popitem(last=False)
+            return b""
+        del self._partial[first]
+        return b"".join(known[k] for k in sorted(known))
 
 
 class OperatorDatagrams(_End):
@@ -134,12 +165,12 @@ class OperatorDatagrams(_End):
         super().__init__(keys.id, keys.to_robot, keys.to_operator)
         self._cookie = _NONE
 
-    def seal(self, message: bytes) -> bytes | None:
-        """The datagram of a message; None where it's too long for one."""
-        return self._seal(self._cookie, message) if len(message) <= ROOM else None
+    def seal(self, message: bytes) -> list[bytes]:
+        """The datagrams of a message; none where it's too long."""
+        return self._seal(self._cookie, message)
 
     def take(self, datagram: bytes) -> bytes:
-        """The message of a datagram; empty where it has none that's new, or the datagram doesn't count."""
+        """The message that a datagram completes; empty where that isn't new, or the datagram doesn't count."""
         found = self._open(datagram)
         if found is None:
             return b""
@@ -161,27 +192,25 @@ class RobotDatagrams(_End):
     def _cookie(self, address: Any) -> bytes:
         return hmac.digest(self._baking, repr(address).encode(), "sha256")[:COOKIE]
 
-    def seal(self, message: bytes) -> bytes | None:
-        """The datagram of a message, for `address`; None where that isn't known, or the message is too long."""
-        if self.address is None or len(message) > ROOM:
-            return None
-        return self._seal(self._cookie(self.address), message)
+    def seal(self, message: bytes) -> list[bytes]:
+        """The datagrams of a message, for `address`; none where that isn't known, or the message is too long."""
+        return [] if self.address is None else self._seal(self._cookie(self.address), message)
 
-    def take(self, datagram: bytes, address: Any) -> tuple[bytes, bytes | None]:
+    def take(self, datagram: bytes, address: Any) -> tuple[bytes, list[bytes]]:
         """Take a datagram that came from an address.
 
         Returns:
-            Its message, empty where it has none that's new, or the datagram doesn't count; and what is to be sent
-            there at once, if anything.
+            The message that it completes, empty where that isn't new, or the datagram doesn't count; and what is to
+            be sent there at once.
         """
         found = self._open(datagram)
         if found is None:
-            return b"", None
+            return b"", []
         shown, message = found
         cookie = self._cookie(address)
         if hmac.compare_digest(shown, cookie):
             self.address = address
-            return message, None
+            return message, []
         return message, self._seal(cookie, b"")
 
 
@@ -251,22 +280,19 @@ class DatagramSocket:
                 continue
             self._take(data, address)
 
-    def send(self, datagram: bytes | None, address: Any = None) -> None:
-        """Send a datagram, if there's one; what the system doesn't take is lost, as on the way.
+    def send(self, datagrams: Iterable[bytes], address: Any = None) -> None:
+        """Send datagrams; what the system doesn't take is lost, as on the way.
 
         Args:
-            datagram: What to send.
+            datagrams: What to send.
             address: Where to; None where the socket is connected.
         """
-        if datagram is None:
-            return
-        try:
-            if address is None:
-                self._socket.send(datagram)
-            else:
-                self._socket.sendto(datagram, address)
-        except OSError:
-            return
+        for datagram in datagrams:
+            with contextlib.suppress(OSError):
+                if address is None:
+                    self._socket.send(datagram)
+                else:
+                    self._socket.sendto(datagram, address)
 
     def close(self) -> None:
         """Read no more."""

@@ -89,7 +89,7 @@ class LiveOperatorConfig:
     camera: CameraConfig | None = None
     """Its camera; None for none, nor voice and screen."""
     datagrams: bool = False
-    """Whether what fits in one is also sent as a datagram, where the robot takes them."""
+    """Whether messages are also sent as datagrams, where the robot takes them."""
     blocked: Callable[[str], None] = lambda _: None
     """Is told once, for people, that no datagram gets through."""
     arm: Callable[[ArmJob], float | str | None] = lambda _: None

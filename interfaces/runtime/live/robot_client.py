@@ -92,7 +92,7 @@ class RobotClient:
             certificate: What this site shows to one that asks for it.
             reports: What its robots send.
             link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
-            datagrams: Whether what fits in one is also sent as a datagram, where the robot takes them.
+            datagrams: Whether messages are also sent as datagrams, where the robot takes them.
             blocked: Is told once, for people, that none gets through.
         """
         self._coming: Any = reports | Ping | Problem
@@ -154,7 +154,7 @@ class RobotClient:
         return "" if same else f"its room is {robot.room!r}, and this site has {room!r}: give both one"
 
     def send(self, message: Value) -> None:
-        """Put a message on the connection, and send it as a datagram where there are some."""
+        """Put a message on the connection, and send it in datagrams where there are some."""
         data = encode(message, Encoding.MSGPACK)
         if self._datagrams is not None:
             sealing, sock = self._datagrams

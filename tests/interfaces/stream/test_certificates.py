@@ -295,6 +295,22 @@ def test_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
                 one.close()
 
 
+def test_a_server_stops_while_somebody_says_farewell(shown: Certificate) -> None:
+    """The client has said it and reads no more, so that TLS isn't over when the server stops."""
+    with served(tls=shown.server_context()) as serving:
+        plain = socket.create_connection(("127.0.0.1", serving.port), 5.0)
+        stream = willing().wrap_socket(plain, server_hostname="localhost")
+        stream.sendall(
+            b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+            b"Sec-WebSocket-Protocol: vrs.1.json\r\n\r\n" % serving.port
+        )
+        assert b" 101 " in stream.recv(4096)
+        stream.sendall(b"\x88\x82\0\0\0\0\x03\xe8")
+        time.sleep(0.1)
+    stream.close()
+
+
 def test_a_robots_health_is_told_to_sites() -> None:
     token = "s" * 43
 
