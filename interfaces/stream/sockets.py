@@ -364,7 +364,6 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         """End the connection, as the server does; it may be ending already, by the other end's farewell."""
         with contextlib.suppress(InvalidState):
             super().shutdown()
-        self.transport.close()
 
     def on_task_complete(self, task: asyncio.Task[None]) -> None:
         """The application is done: what is left ends soon."""
@@ -515,8 +514,6 @@ async def serve(
         asyncio.get_running_loop().call_later(_GRACE, _abort_all, connections)
         await task
         _abort_all(connections)
-        # Sockets are closed in the round after.
-        await asyncio.sleep(0)
 
 
 @contextlib.asynccontextmanager

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final, NamedTuple
 
 from interfaces.rsp import header
-from interfaces.rsp.session import OVERHEAD, DropReason, PacketCipher, PacketDropped, hkdf
+from interfaces.rsp.session import OVERHEAD, PacketCipher, PacketDropped, hkdf
 from interfaces.stream.limits import Bucket
 
 LONGEST: Final = 1200
@@ -81,7 +81,7 @@ def _keys(secret: str) -> _Keys:
     return _Keys(made[:ID], made[ID : ID + 32], made[ID + 32 :])
 
 
-class _End:
+class DatagramEnd:
     """One end of a connection's datagrams, and which messages have come there by whatever way."""
 
     def __init__(self, name: bytes, sending: bytes, receiving: bytes) -> None:
@@ -89,8 +89,8 @@ class _End:
         self._known: OrderedDict[bytes, None] = OrderedDict()
         self._partial: OrderedDict[int, dict[int, bytes]] = OrderedDict()
         self._alone = 0
-        self.came = self.dropped = 0
-        """Datagrams that counted; those that were forged, changed, of another connection, too long, or repeated."""
+        self.came = 0
+        """Datagrams that counted."""
 
     @property
     def state(self) -> DatagramState:
@@ -101,11 +101,12 @@ class _End:
 
     def streamed(self, message: bytes) -> bool:
         """Whether a message that has come by the stream comes for the first time."""
-        new = self._is_new(message)
+        new = self.is_new(message)
         self._alone += new and len(message) <= ROOM
         return new
 
-    def _is_new(self, message: bytes) -> bool:
+    def is_new(self, message: bytes) -> bool:
+        """Whether a message comes for the first time, by whatever way."""
         key = hashlib.blake2b(message, digest_size=16).digest()
         if key in self._known:
             return False
@@ -128,19 +129,18 @@ class _End:
 
     def _open(self, datagram: bytes) -> tuple[bytes, bytes] | None:
         """The cookie of a datagram that's authentic and new, and the message if that's new and complete with it."""
+        if len(datagram) > LONGEST or datagram[:ID] != self._id:
+            return None
         try:
-            if len(datagram) > LONGEST or datagram[:ID] != self._id:
-                raise PacketDropped(DropReason.SESSION)
             body, count = self._cipher.open(datagram)
-            if len(body) < COOKIE + 2 or body[COOKIE + 1] > PIECES:
-                raise PacketDropped(DropReason.MALFORMED)
         except PacketDropped:
-            self.dropped += 1
+            return None
+        if len(body) < COOKIE + 2 or body[COOKIE + 1] > PIECES:
             return None
         self.came, self._alone = self.came + 1, 0
         k, pieces = body[COOKIE : COOKIE + 2]
         message = self._joined(count - k, k, pieces, body[COOKIE + 2 :])
-        return body[:COOKIE], message if message and self._is_new(message) else b""
+        return body[:COOKIE], message if message and self.is_new(message) else b""
 
     def _joined(self, first: int, k: int, pieces: int, piece: bytes) -> bytes:
         """The message that its k-th piece completes, or nothing; `first` is the counter of its first piece."""
@@ -156,7 +156,7 @@ class _End:
         return b"".join(known[k] for k in sorted(known))
 
 
-class OperatorDatagrams(_End):
+class OperatorDatagrams(DatagramEnd):
     """The operator's end."""
 
     def __init__(self, secret: str) -> None:
@@ -178,7 +178,7 @@ class OperatorDatagrams(_End):
         return message
 
 
-class RobotDatagrams(_End):
+class RobotDatagrams(DatagramEnd):
     """The robot's end."""
 
     def __init__(self, secret: str) -> None:
@@ -189,12 +189,13 @@ class RobotDatagrams(_End):
         self.address: Any = None
         """Where the operator's site has been proven to be; None before that."""
 
-    def _cookie(self, address: Any) -> bytes:
+    def cookie(self, address: Any) -> bytes:
+        """What proves that somebody is at an address."""
         return hmac.digest(self._baking, repr(address).encode(), "sha256")[:COOKIE]
 
     def seal(self, message: bytes) -> list[bytes]:
         """The datagrams of a message, for `address`; none where that isn't known, or the message is too long."""
-        return [] if self.address is None else self._seal(self._cookie(self.address), message)
+        return [] if self.address is None else self._seal(self.cookie(self.address), message)
 
     def take(self, datagram: bytes, address: Any) -> tuple[bytes, list[bytes]]:
         """Take a datagram that came from an address.
@@ -207,7 +208,7 @@ class RobotDatagrams(_End):
         if found is None:
             return b"", []
         shown, message = found
-        cookie = self._cookie(address)
+        cookie = self.cookie(address)
         if hmac.compare_digest(shown, cookie):
             self.address = address
             return message, []
