@@ -160,6 +160,13 @@ TlsCert: TypeAlias = Annotated[
 ]
 TlsKey: TypeAlias = Annotated[Path | None, option("--tls-key FILE", "Its key, PEM.")]
 """What is encrypted: see `certificate_for`."""
+Datagrams: TypeAlias = Annotated[
+    bool | None,
+    option(
+        "--datagrams/--no-datagrams",
+        "Take and send datagrams, too, by UDP on the same port; usual where TLS is spoken.",
+    ),
+]
 ReachedAs: TypeAlias = Annotated[
     list[str] | None,
     option(
@@ -244,7 +251,7 @@ OF_CAMERAS: Final = ("camera",)
 """The same of robots that pictures are made of."""
 OF_SITES: Final = (
     "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead",
-    "friction", "pose", "reports", "reached-as", "audit", "tls", "tls-cert", "tls-key",
+    "friction", "pose", "reports", "reached-as", "audit", "tls", "tls-cert", "tls-key", "datagrams",
 )  # fmt: skip
 """The same of robots that have a site, as thin clients haven't."""
 

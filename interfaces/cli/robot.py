@@ -18,6 +18,7 @@ from interfaces.cli.options import (
     Architecture,
     Audit,
     BodyName,
+    Datagrams,
     Hosts,
     OperatorLossName,
     ReachedAs,
@@ -52,7 +53,7 @@ from interfaces.system import run_loop, software
 from robots.driver import load_driver, standing
 from robots.robot import USUAL, USUAL_CLIENT, ThinClient, is_driver, load
 from vrs.checks import number_in, one_of
-from vrs.errors import InvalidValueError
+from vrs.errors import FormatError, InvalidValueError
 from vrs.model import home
 
 if TYPE_CHECKING:
@@ -202,6 +203,7 @@ def robot(
     tls: Tls = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
+    datagrams: Datagrams = None,
     audit: Audit = None,
     until_eof: Annotated[
         bool, option("--until-eof", "End when standard input does, once the robot rests.")
@@ -237,7 +239,7 @@ def robot(
         from interfaces.stream.certificates import own_certificate
 
         theirs = own_certificate(site_certificate(token_file), (), client=True)
-    door = _Door(address, allowed, shown, theirs)
+    door = _Door(address, allowed, shown, theirs, shown is not None if datagrams is None else datagrams)
     made: LiveBody
     if chosen.is_base:
         from interfaces.jobs import RunnerConfig
@@ -303,6 +305,18 @@ class _Door(NamedTuple):
     """Its own; None without TLS."""
     theirs: Certificate | None
     """What operators' sites show; None where anybody's may come."""
+    datagrams: bool
+    """Whether datagrams are taken, too."""
+
+    def bound(self, port: int) -> socket.socket | None:
+        """Where datagrams come to that port; None without them, or where the port is another program's by UDP."""
+        from interfaces.rsp.live import bind
+
+        try:
+            return bind(self.address.host, port) if self.datagrams else None
+        except FormatError as error:
+            typer.echo(f"vrs: no datagrams, the stream alone: UDP, {error}", err=True)
+            return None
 
 
 async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_eof: bool) -> str:
@@ -322,7 +336,8 @@ async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_
     app = application(robot.routes, door.allowed(port))
     kind, remark = says
     context = None if certificate is None else certificate.server_context(None if theirs is None else theirs.chain)
-    async with sockets.serve(app, listening, largest=LARGEST, tls=context), robot.running():
+    datagrams = door.bound(port)
+    async with sockets.serve(app, listening, largest=LARGEST, tls=context), robot.running(datagrams):
         await robot.ready()
         keep_quiet()
         hasten(1)
@@ -333,6 +348,8 @@ async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_
             say_certificate(certificate)
             if theirs is not None:
                 typer.echo(f"vrs: operators' sites show {theirs.chain}: copy it to them with the token file")
+            if datagrams is not None:
+                typer.echo(f"vrs: datagrams, too, by UDP on port {port}")
             if remark:
                 typer.echo(f"vrs: {remark}", err=True)
             sys.stdout.flush()

@@ -127,6 +127,12 @@ def serve(
         str | None, option("HOST:PORT|URL", "Where vrs robot listens; without it one is started.")
     ] = None,
     robot_token_file: Annotated[Path | None, option("FILE", "Token file of that robot.")] = None,
+    datagrams: Annotated[
+        bool,
+        option(
+            "--datagrams/--no-datagrams", "What goes to that robot goes as datagrams, too, where it takes them."
+        ),
+    ] = True,
     token_file: TokenFile = None,
     reached_as: ReachedAs = None,
     tls: Tls = None,
@@ -269,7 +275,8 @@ def serve(
         eye = camera if robot.device(HeadCamera) else 0.0
         folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
         serving.append(_Serving(
-            robot, link, seed + k, policy, at, token, theirs, tuple(options), place, _own(jobs, k, robot), eye,
+            robot, link, seed + k, policy, at, token, theirs, datagrams, tuple(options), place,
+            _own(jobs, k, robot), eye,
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
             behind, architecture, folder, in_order,
         ))  # fmt: skip
@@ -308,6 +315,8 @@ class _Serving:
     robot_token: str | None = field(repr=False)
     robot_certificate: Certificate | None
     """What is shown to it."""
+    datagrams: bool
+    """Whether it's sent datagrams, too, if it takes them."""
     options: tuple[str, ...]
     """Of the robot that is started."""
     room: Room
@@ -531,6 +540,7 @@ def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | N
         recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
+        datagrams=serving.datagrams, blocked=lambda said: typer.echo(f"vrs: {said}", err=True),
         in_order=serving.in_order,
     )  # fmt: skip
     return LiveOperator(config, access, clock=clock, audit=log)

@@ -252,6 +252,8 @@ class Hello(Message, frozen=True, omit_defaults=True, gc=False, tag="hello"):
     robot's own."""
     alters: bool = False
     """Whether it runs programs whose path others may correct: while it has control, their `correct` comes to it."""
+    datagrams: bool = False
+    """Of an operator's site: whether it takes datagrams, too."""
 
 
 class Lease(Leased, frozen=True, omit_defaults=True, gc=False, tag="lease"):
@@ -373,6 +375,7 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
     """Follows the operator's site that said hello; what it is and how it behaves."""
 
     sender: ClassVar[Party] = Party.ROBOT
+    secrets: ClassVar[tuple[str, ...]] = ("datagrams",)
     protocol: Number
     """Version of the protocol that is spoken."""
 
@@ -400,6 +403,8 @@ class Attached(Message, frozen=True, omit_defaults=True, gc=False, eq=False, tag
     """Of a mobile robot: whether its virtual one is drawn where the posture estimator has it."""
     scene: Scene | None = None
     """Of an arm: what is around it, as it was at first; absent: nothing that it could grasp."""
+    datagrams: Word = ""
+    """Secret of this connection's datagrams; empty: there are none."""
 
 
 class Acquire(Message, frozen=True, omit_defaults=True, gc=False, tag="acquire"):

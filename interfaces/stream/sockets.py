@@ -18,6 +18,7 @@ from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
+from websockets.exceptions import InvalidState
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
@@ -359,6 +360,11 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         if self.response.status_code == 101:
             self.scope["state"]["socket"] = self
 
+    def shutdown(self) -> None:
+        """End the connection, as the server does; it may be ending already, by the other end's farewell."""
+        with contextlib.suppress(InvalidState):
+            super().shutdown()
+
     def on_task_complete(self, task: asyncio.Task[None]) -> None:
         """The application is done: what is left ends soon."""
         super().on_task_complete(task)
@@ -416,6 +422,14 @@ def let_stay(scope: Scope, *, known: bool) -> None:
     connection = scope.get("state", {}).get("socket")
     if isinstance(connection, BoundedWebSocket):
         connection.let_stay(known=known)
+
+
+def tls_version(scope: Scope) -> str:
+    """The version of TLS that an application's WebSocket comes by, as in `TLSv1.3`; empty for none."""
+    connection = scope.get("state", {}).get("socket")
+    transport = connection.transport if isinstance(connection, BoundedWebSocket) else None
+    spoken = None if transport is None else transport.get_extra_info("ssl_object")
+    return "" if spoken is None else str(spoken.version())
 
 
 def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:

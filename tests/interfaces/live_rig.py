@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -14,7 +15,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ssl import SSLContext
 from typing import Any
 
@@ -84,30 +85,39 @@ async def robot_here(
     tls: SSLContext | None = None,
     audit: AuditLog | None = None,
     access: Access | None = None,
+    datagrams: int | None = None,
 ) -> AsyncIterator[tuple[LiveRobot, str]]:
-    """A robot's site in this loop, and its URL."""
+    """A robot's site in this loop, and its URL; it takes datagrams on the stream's port, or on another one."""
     host = RobotHostConfig(site=RobotSiteConfig(beat=0.03) if site is None else site, lead=LEAD)
     listening = sockets.bind("127.0.0.1", port)
     port = listening.getsockname()[1]
     made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
     robot = LiveRobot(made, Access(free={Role.SITE}) if access is None else access, audit=audit)
     app = application(robot.routes, hosts(["127.0.0.1"], port))
-    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running():
+    udp = None if datagrams is None else socket.socket(type=socket.SOCK_DGRAM)
+    if udp is not None:
+        udp.bind(("127.0.0.1", 0 if datagrams else port))
+    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running(udp):
         await robot.ready()
         yield robot, f"{'ws' if tls is None else 'wss'}://127.0.0.1:{port}/site"
 
 
 @contextlib.asynccontextmanager
 async def operator_here(
-    url: str, *, delay: str = "none", certificate: Certificate | None = None
+    url: str,
+    *,
+    delay: str = "none",
+    certificate: Certificate | None = None,
+    blocked: Callable[[str], None] | None = None,
 ) -> AsyncIterator[tuple[LiveOperator, str]]:
-    """An operator's site in this loop, and its URL for programs."""
+    """An operator's site in this loop, and its URL for programs; it wants datagrams where `blocked` is given."""
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(
-        LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate), Access(free=OPEN)
-    )
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate)
+    if blocked is not None:
+        config = replace(config, datagrams=True, blocked=blocked)
+    operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
+import socket
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import AbstractAsyncContextManager
@@ -117,14 +118,18 @@ class LiveRobot:
         return [Route("/health", self._say_health), *self._server.routes]
 
     @contextlib.asynccontextmanager
-    async def running(self) -> AsyncIterator[LiveRobot]:
+    async def running(self, datagrams: socket.socket | None = None) -> AsyncIterator[LiveRobot]:
         """Run the body, and serve meanwhile.
+
+        Args:
+            datagrams: Where they come to, bound to the stream's port, which is closed in the end; None for none.
 
         Raises:
             PhysicsStartError: If the body can't be made.
         """
         async with self.body.running(self._turning.soon):
             self._turning.start()
+            self._server.start(datagrams)
             try:
                 yield self
             finally:
@@ -182,6 +187,7 @@ class LiveRobot:
             "epoch": 0 if site is None else site.epoch,
             "halted": "" if site is None else site.halted,
             "link_loss": self._attached().link_loss,
+            "datagrams": self._server.datagrams,
             **body.health(),
             "timer_late": self._turning.lateness.worst,
         }

@@ -7,14 +7,16 @@ import contextlib
 import logging
 import secrets
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import msgspec
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import WebSocketException
 
 from interfaces.messages.control import PROTOCOL, Attached, Hello, Ping, Problem, ProtocolError, Role
 from interfaces.messages.sites import Report
+from interfaces.runtime.live.datagrams import NO_UDP, DatagramSocket, DatagramState, OperatorDatagrams, connected
 from interfaces.stream.certificates import Certificate, explained
 from interfaces.stream.client_socket import dial
 from interfaces.stream.codec import Encoding, Value, decode, encode
@@ -33,6 +35,8 @@ OPENING = 3.0
 """Longest that a connection may take to be made, and answered [s]."""
 LARGEST = 4 << 20
 """Longest message of a robot: a plan of thousands of segments [B]."""
+BLOCKED = "no datagram gets through, so all goes by the stream alone: is UDP let through to the port of"
+"""What is said of datagrams, before an address."""
 _WAITING = 64
 """Most messages that wait to be sent; older ones are dropped, for newer ones repeat what counts."""
 _BLOCKED = 2.0
@@ -72,6 +76,8 @@ class RobotClient:
         certificate: Certificate | None = None,
         reports: type = Report,
         link_loss: LossPolicy | None = None,
+        datagrams: bool = False,
+        blocked: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Say where the robot is; `run` connects.
 
@@ -86,13 +92,18 @@ class RobotClient:
             certificate: What this site shows to one that asks for it.
             reports: What its robots send.
             link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
+            datagrams: Whether messages are also sent as datagrams, where the robot takes them.
+            blocked: Is told once, for people, that none gets through.
         """
         self._coming: Any = reports | Ping | Problem
         self._name, self._room, self._link_loss = name, room, link_loss
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
         self._certificate = certificate
         self._session = secrets.token_urlsafe(12)
-        self._waiting: deque[Value] = deque(maxlen=_WAITING)
+        self._wants_datagrams, self._blocked = datagrams, blocked
+        self._told = False
+        self._datagrams: tuple[OperatorDatagrams, DatagramSocket] | None = None
+        self._waiting: deque[bytes] = deque(maxlen=_WAITING)
         self._wake = asyncio.Event()
         self.attached: Attached | None = None
         """What the robot said of itself; None while there's no connection."""
@@ -126,7 +137,13 @@ class RobotClient:
             "ok": not reason,
             "reason": reason,
             "silence": silence if silence < 1e6 else None,
+            "datagrams": self.datagrams,
         }
+
+    @property
+    def datagrams(self) -> DatagramState:
+        """How datagrams to and from the robot get on."""
+        return DatagramState.OFF if self._datagrams is None else self._datagrams[0].state
 
     def _unfit(self, robot: Attached) -> str:
         """Why a robot isn't the one that is driven here; empty if it is."""
@@ -137,8 +154,12 @@ class RobotClient:
         return "" if same else f"its room is {robot.room!r}, and this site has {room!r}: give both one"
 
     def send(self, message: Value) -> None:
-        """Put a message on the connection."""
-        self._waiting.append(message)
+        """Put a message on the connection, and send it in datagrams where there are some."""
+        data = encode(message, Encoding.MSGPACK)
+        if self._datagrams is not None:
+            sealing, sock = self._datagrams
+            sock.send(sealing.seal(data))
+        self._waiting.append(data)
         self._wake.set()
 
     async def run(self) -> None:
@@ -174,29 +195,67 @@ class RobotClient:
             closing=0.5,
             certificate=self._certificate,
         )
-        async with line as socket:
-            hello = Hello(PROTOCOL, Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss)
-            await socket.send(encode(hello, Encoding.MSGPACK))
+        async with line as stream:
+            hello = Hello(
+                PROTOCOL, Role.SITE, "vrs serve", self._token, self._session, link_loss=self._link_loss,
+                datagrams=self._wants_datagrams,
+            )  # fmt: skip
+            await stream.send(encode(hello, Encoding.MSGPACK))
             async with asyncio.timeout(OPENING):
-                answer = decode(_bytes(await socket.recv()), Encoding.MSGPACK, allowed=Attached | Problem)
+                answer = decode(_bytes(await stream.recv()), Encoding.MSGPACK, allowed=Attached | Problem)
             if isinstance(answer, Problem):
                 raise RobotRefusedError(answer.text)
             if unfit := self._unfit(answer):
                 raise RobotUnfitError(unfit)
-            self.attached, self.problem = answer, ""
+            self.attached, self.problem = msgspec.structs.replace(answer, datagrams=""), ""
             self.connections += 1
             self._waiting.clear()
             self._line.connected = True
             self._changed()
-            writer = asyncio.create_task(self._write(socket))
+            writer = asyncio.create_task(self._write(stream))
             try:
-                async for data in socket:
-                    self._take(_bytes(data))
+                with self._beside(answer.datagrams, stream):
+                    async for data in stream:
+                        self._streamed(_bytes(data))
             finally:
                 writer.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await writer
             self.problem = "the robot's site closed the connection"
+
+    @contextlib.contextmanager
+    def _beside(self, secret: str, stream: ClientConnection) -> Iterator[None]:
+        """Send and take datagrams meanwhile, to where the stream goes; none without a secret."""
+
+        def take(datagram: bytes, _address: object) -> None:
+            message = ours.take(datagram)
+            try:
+                if message:
+                    self._take(message)
+            except Exception:  # noqa: BLE001 - as on the stream: whatever it is, it ends no more than this connection
+                _LOG.exception("a datagram of the robot's failed")
+                stream.transport.abort()
+
+        with contextlib.ExitStack() as stack:
+            if secret and self._wants_datagrams:
+                ours = OperatorDatagrams(secret)
+                with contextlib.suppress(*NO_UDP):
+                    reading = DatagramSocket(connected(stream.remote_address), take)
+                    self._datagrams = ours, stack.enter_context(contextlib.closing(reading))
+            try:
+                yield
+            finally:
+                self._datagrams = None
+
+    def _streamed(self, data: bytes) -> None:
+        """Take a message that has come by the stream, unless it has come as a datagram already."""
+        if self._datagrams is None:
+            self._take(data)
+        elif self._datagrams[0].streamed(data):
+            self._take(data)
+            if self.datagrams is DatagramState.BLOCKED and not self._told:
+                self._told = True
+                self._blocked(f"{BLOCKED} {self.url.partition('#')[0]}")
 
     def _take(self, data: bytes) -> None:
         message = decode(data, Encoding.MSGPACK, allowed=self._coming, largest=LARGEST)
@@ -207,16 +266,16 @@ class RobotClient:
         self._line.receive(message, now=self.heard)
         self._changed()
 
-    async def _write(self, socket: ClientConnection) -> None:
+    async def _write(self, stream: ClientConnection) -> None:
         try:
             while True:
                 await self._wake.wait()
                 self._wake.clear()
                 while self._waiting:
                     async with asyncio.timeout(_BLOCKED):
-                        await socket.send(encode(self._waiting.popleft(), Encoding.MSGPACK))
+                        await stream.send(self._waiting.popleft())
         except (OSError, TimeoutError, WebSocketException):
-            socket.transport.abort()
+            stream.transport.abort()
 
 
 def _bytes(data: str | bytes) -> bytes:

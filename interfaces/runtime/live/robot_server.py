@@ -5,19 +5,23 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import secrets
+import socket
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import msgspec
 from starlette.routing import BaseRoute, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
 from interfaces.messages.control import PROTOCOL, Attached, Hello, Pong, Problem, ProblemCode, ProtocolError, Role
+from interfaces.runtime.live.datagrams import NO_UDP, DatagramSocket, DatagramState, RobotDatagrams
 from interfaces.stream.access import Access
 from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, Value, decode, encode
 from interfaces.stream.server import Endpoint
-from interfaces.stream.sockets import let_stay
+from interfaces.stream.sockets import let_stay, tls_version
 from interfaces.teleop.connection import Host
 from robots.onboard.watchdog import LossPolicy
 from vrs.checks import one_of
@@ -36,6 +40,8 @@ _GONE = 1001
 _NO_ROOM = 1013
 _POLICY = 1008
 _FAILED = 1011
+_KEEPS_SECRETS = {"", "TLSv1.3"}
+"""Streams on which the secret of datagrams is told: those that aren't encrypted have no other."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -48,10 +54,13 @@ class _OperatorConnection:
         self.wake = asyncio.Event()
         self.close: tuple[int, str] | None = None
         self.problems = 0
+        self.datagrams: RobotDatagrams | None = None
 
-    def send(self, message: Value) -> None:
-        self.waiting.append(encode(message, self.encoding))
+    def send(self, message: Value) -> bytes:
+        data = encode(message, self.encoding)
+        self.waiting.append(data)
         self.wake.set()
+        return data
 
     def end(self, code: int, reason: str) -> None:
         self.close = code, reason
@@ -84,6 +93,7 @@ class RobotServer:
             audit: Where it's written who is followed, and who is refused; nowhere unless given.
         """
         self._audit = audit
+        self._socket: DatagramSocket | None = None
         self._host, self._clock, self._access = host, clock, access
         self._attached, self._met, self._heard = attached, met, heard
         self._coming: Any = host.orders | Pong
@@ -99,16 +109,34 @@ class RobotServer:
         """Whether an operator's site is there."""
         return self._connection is not None
 
+    @property
+    def datagrams(self) -> DatagramState:
+        """How datagrams from the operator's site get on."""
+        ours = None if self._connection is None else self._connection.datagrams
+        return DatagramState.OFF if ours is None else ours.state
+
     def send(self, messages: Iterable[Value]) -> None:
         """Send messages to the operator's site; without one they're dropped."""
-        if self._connection is not None:
-            for message in messages:
-                self._connection.send(message)
+        connection = self._connection
+        if connection is None:
+            return
+        for message in messages:
+            data = connection.send(message)
+            if connection.datagrams is not None and self._socket is not None:
+                self._socket.send(connection.datagrams.seal(data), connection.datagrams.address)
+
+    def start(self, datagrams: socket.socket | None) -> None:
+        """Take datagrams from now on, where the loop runs: by a bound socket; None for none."""
+        if datagrams is not None:
+            with contextlib.suppress(*NO_UDP):
+                self._socket = DatagramSocket(datagrams, self._take)
 
     def close(self) -> None:
         """Say farewell to the operator's site."""
         if self._connection is not None:
             self._connection.end(_GONE, "the robot's site stops")
+        if self._socket is not None:
+            self._socket.close()
 
     async def serve(self, encoding: Encoding, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a connection that was accepted, until it ends."""
@@ -118,7 +146,7 @@ class RobotServer:
         try:
             try:
                 async with asyncio.timeout(HELLO):
-                    refusal = self._greet(connection, await receive())
+                    refusal = self._greet(connection, await receive(), tls_version(scope))
             except TimeoutError:
                 refusal = Problem(ProblemCode.HELLO_LATE, f"no hello within {HELLO:g} s", fatal=True)
             if refusal is None:
@@ -130,7 +158,9 @@ class RobotServer:
                 connection.send(refusal)
                 connection.end(_POLICY if refusal.code is not ProblemCode.FULL else _NO_ROOM, refusal.text)
             while connection.close is None and (message := await receive())["type"] != "websocket.disconnect":
-                self._hear(connection, _data(message))
+                data = _data(message)
+                if connection.datagrams is None or connection.datagrams.streamed(data):
+                    self._hear(connection, data)
             await asyncio.wait([writer], timeout=1.0 if connection.close is not None else 0.0)
         finally:
             writer.cancel()
@@ -142,7 +172,7 @@ class RobotServer:
         if self._audit is not None:
             self._audit.note(event, role=Role.SITE.value, address=address)
 
-    def _greet(self, connection: _OperatorConnection, message: Any) -> Problem | None:
+    def _greet(self, connection: _OperatorConnection, message: Any, tls: str) -> Problem | None:
         """Take the first message; why it can't be, or None if the operator is followed from now on."""
         try:
             hello = decode(_data(message), connection.encoding, allowed=Hello)
@@ -165,9 +195,25 @@ class RobotServer:
             self._connection.end(_POLICY, "the same site has connected again")
         self._connection = connection
         attached = self._attached()
-        connection.send(attached)
+        if hello.datagrams and self._socket is not None and tls in _KEEPS_SECRETS:
+            secret = secrets.token_urlsafe(32)
+            connection.datagrams = RobotDatagrams(secret)
+            connection.send(msgspec.structs.replace(attached, datagrams=secret))
+        else:
+            connection.send(attached)
         self._met(attached)
         return None
+
+    def _take(self, datagram: bytes, address: Any) -> None:
+        """Take a datagram from an address."""
+        connection = self._connection
+        if connection is None or connection.datagrams is None:
+            return
+        message, answer = connection.datagrams.take(datagram, address)
+        assert self._socket is not None
+        self._socket.send(answer, address)
+        if message:
+            self._hear(connection, message)
 
     def _hear(self, connection: _OperatorConnection, data: bytes) -> None:
         if self._connection is not connection:

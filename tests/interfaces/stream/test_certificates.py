@@ -8,6 +8,7 @@ import http.client
 import json
 import socket
 import ssl
+import threading
 import time
 from pathlib import Path
 
@@ -293,6 +294,24 @@ def test_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
         finally:
             for one in idle:
                 one.close()
+
+
+def test_a_server_stops_while_somebody_says_farewell(shown: Certificate) -> None:
+    """The client has said it, and doesn't close yet, so that TLS isn't over when the server begins to stop."""
+    with served(tls=shown.server_context()) as serving:
+        plain = socket.create_connection(("127.0.0.1", serving.port), 5.0)
+        stream = willing().wrap_socket(plain, server_hostname="localhost")
+        stream.sendall(
+            b"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+            b"Sec-WebSocket-Protocol: vrs.1.json\r\n\r\n" % serving.port
+        )
+        assert b" 101 " in stream.recv(4096)
+        stream.sendall(b"\x88\x82\0\0\0\0\x03\xe8")
+        time.sleep(0.1)
+        closing = threading.Timer(0.3, stream.close)
+        closing.start()
+    closing.join()
 
 
 def test_a_robots_health_is_told_to_sites() -> None:
