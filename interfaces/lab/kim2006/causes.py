@@ -1,25 +1,24 @@
 """Why datagrams aren't shown to be better under some networks: the one cause that is suspected is taken away.
 
-Where nobody makes much of the path, only its first centimetres are compared: there the path is four times as long.
-Where the position that comes back is older than the way over which the robot is led back, nobody keeps the path:
-there it's led back over a longer way. Everything else is as it was.
+Where robots on TCP make little of the path, seeds differ much, and ten are too few: there are more of them. Where
+the position that comes back is older than the way over which the robot is led back, nobody keeps the path: there
+it's led back over a longer way. Everything else is as it was.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple
 
 from interfaces.lab.claims import OWN_BAR, Findings, Results, Study, Table, at_most
-from interfaces.lab.kim2006.following import FollowingCase, run
-from interfaces.lab.kim2006.links import EQUAL, compared, nearness, pair
+from interfaces.lab.kim2006.following import RECOVERY, FollowingCase, run
+from interfaces.lab.kim2006.links import EQUAL, compared, mean_of, nearness, pair
 
-TIMES: Final = 4.0
-"""How much longer the path is."""
+MORE: Final = 2
+"""How many times as many seeds there are."""
 FAR: Final = 1.0
-"""λ that is longer than what the robot makes in a round trip of 2.6 s [m]."""
+"""λ, longer than what the robot makes in a round trip of 2.6 s [m]."""
 SCHEMES: Final = ("rsp", "tcp", "stream")
 
 
@@ -28,48 +27,37 @@ class Cause(NamedTuple):
 
     delay: str
     loss: float
-    what: str
-    take_away: Callable[[FollowingCase], FollowingCase]
+    seeds: int = 1
+    """How many times as many."""
+    recovery: float = RECOVERY
+    """λ [m]."""
 
-
-def _longer(case: FollowingCase) -> FollowingCase:
-    return replace(case, length=TIMES * case.length)
-
-
-def _led_further(case: FollowingCase) -> FollowingCase:
-    return replace(case, recovery=FAR)
+    @property
+    def said(self) -> str:
+        """What is otherwise."""
+        return f"{self.seeds} times as many seeds" if self.seeds > 1 else f"led back over {self.recovery:g} m"
 
 
 CAUSES: Final = {
-    f"{delay} {loss:g}": Cause(delay, loss, what, take_away)
-    for what, take_away, those in (
-        (f"a path {TIMES:g} times as long", _longer, (("country", 0.05), ("tue", 0.0), ("tue", 0.1), ("thu", 0.1))),
-        (f"led back over {FAR:g} m", _led_further, (("lunar", 0.05), ("lunar", 0.1))),
+    f"{one.delay} {one.loss:g}": one
+    for one in (
+        *(Cause(*network, seeds=MORE) for network in (("country", 0.05), ("tue", 0.0), ("tue", 0.1), ("thu", 0.1))),
+        *(Cause("lunar", loss, recovery=FAR) for loss in (0.05, 0.1)),
     )
-    for delay, loss in those
 }
 CASES: Final = tuple(CAUSES)
 
 
 def work(study: Study, case: str) -> Results:
-    """All seeds of a network, with its cause and without it."""
-    delay, loss, _, take_away = CAUSES[case]
-    found = {}
-    for taken in (False, True):
-        for name in SCHEMES:
-            cases = (
-                FollowingCase(name, delay, loss, study.seed + k, study.length, "bare") for k in range(study.runs)
-            )
-            found[name, taken] = [run(take_away(one) if taken else one) for one in cases]
+    """All seeds of a network without its cause."""
+    cause = CAUSES[case]
+    following = FollowingCase("rsp", cause.delay, cause.loss, 0, study.length, "bare", recovery=cause.recovery)
+    seeds = range(study.seed, study.seed + cause.seeds * study.runs)
+    runs = {name: [run(replace(following, scheme=name, seed=seed)) for seed in seeds] for name in SCHEMES}
     return Results(
-        before=pair(found["rsp", False], found["tcp", False]),
-        after=pair(found["rsp", True], found["tcp", True]),
-        streamed=pair(found["stream", True], found["tcp", True]),
-        # Centimetres that both robots made, a run.
-        common=[
-            [min(len(a.arrivals), len(b.arrivals)) for a, b in zip(found["rsp", k], found["tcp", k], strict=True)]
-            for k in (False, True)
-        ],
+        pairs=pair(runs["rsp"], runs["tcp"]),
+        streamed=pair(runs["stream"], runs["tcp"]),
+        progress=[mean_of(runs[name]).progress for name in SCHEMES[:2]],
     )
 
 
@@ -77,21 +65,17 @@ def conclude(_study: Study, results: tuple[Any, ...]) -> Findings:
     """Without its cause RSP is nearer to the path than TCP with fixed packets."""
     claims, rows = [], []
     for case, found in zip(CASES, results, strict=True):
-        delay, loss, what, _ = CAUSES[case]
-        text = f"{delay}, loss {loss:g}, {what}: path error of RSP by that of TCP with fixed packets"
+        cause = CAUSES[case]
+        text = (
+            f"{cause.delay}, loss {cause.loss:g}, {cause.said}: path error of RSP by that of TCP with fixed packets"
+        )
         claim = partial(at_most, text, OWN_BAR, 1 - EQUAL)
-        claims.append(compared(claim, found.after, "RSP's packets on TCP", found.streamed, text))
-        for how, pairs, common in (
-            ("as it was", found.before, found.common[0]),
-            (what, found.after, found.common[1]),
-        ):
-            ratio = nearness(pairs)
-            low, high = (None, None) if ratio is None else ratio.interval
-            rows.append((
-                delay, loss, how, None if ratio is None else ratio.value, low, high, min(common),
-                sorted(common)[len(common) // 2],
-            ))  # fmt: skip
+        claims.append(compared(claim, found.pairs, "RSP's packets on TCP", found.streamed, text))
+        ratio, both = nearness(found.pairs), len(found.pairs[0])
+        ends = (None, None, None) if ratio is None else (ratio.value, *ratio.interval)
+        rows.append((cause.delay, cause.loss, cause.said, *ends, both, *found.progress))
     columns = (
-        "delay", "loss", "how", "RSP by TCP", "from", "to", "path that both made, least [cm]", "median [cm]",
+        "delay", "loss", "without its cause", "RSP by TCP", "from", "to", "seeds in which both moved",
+        "of the path made by RSP", "by TCP",
     )  # fmt: skip
     return Findings(tuple(claims), (Table("causes", "One cause taken away", columns, tuple(rows)),))
