@@ -165,20 +165,6 @@ def below_zero(claim: str, source: str, difference: Estimate, without: Without =
     return _bounded(claim, source, "< 0", difference, without, lambda end: end < 0)
 
 
-def beats(claim: str, source: str, saved: Estimate, rival: tuple[str, Estimate]) -> Claim:
-    """A claim that a figure is surely less than a rival's; in the rival's own place nothing would be saved.
-
-    Args:
-        claim: What is claimed, with the unit of what was measured.
-        source: Where.
-        saved: The rival's figure less ours, run by run: above zero with all of its interval.
-        rival: What it is, and its figure.
-    """
-    what, theirs = rival
-    itself = Counterfactual(what, theirs.value, met=False, interval=theirs.interval)
-    return Claim(claim, source, "over 0", saved.value, saved.low > 0, saved.interval, itself)
-
-
 def none_of(claim: str, source: str, count: int, without: tuple[str, int] | None = None, *, of: int = 1) -> Claim:
     """A claim that nothing was counted among something; see `at_most`."""
     beside = None if without is None else Counterfactual(*without, met=without[1] == 0)

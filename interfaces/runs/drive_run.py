@@ -25,6 +25,10 @@ DriveLink: TypeAlias = Link[DriveOrders, DriveReport]
 """What is between both sites."""
 
 
+KNOWN, SENSED = "known", "sensed"
+"""What a virtual environment holds."""
+
+
 @dataclass(frozen=True, slots=True)
 @validated
 class DriveCase:
@@ -48,6 +52,9 @@ class DriveCase:
     position: str = "fused"
     """What tells the real robot where it is: `fused` (odometry and camera), `laser` (odometry and laser on the map
     of its room), `odometry`, or the `truth`."""
+    environment: str = ""
+    """What the virtual robot avoids: `known`, its room's map; `sensed`, what the real one senses as well; unless
+    given, `sensed` under architectures that sense, and else nothing."""
     known: Robot | None = field(default=None, repr=False, compare=False)
     """The robot, where somebody has it; else it's found by what `robot` says."""
 
@@ -76,6 +83,7 @@ class DriveCase:
         object.__setattr__(self, "transport", Transport(one_of("transport", self.transport, list(Transport))))
         self.real[0].base  # noqa: B018 - raises where it's none
         one_of("position", self.position, POSITIONS)
+        one_of("environment", self.environment, ("", KNOWN, SENSED))
         if isinstance(self.room, str):
             one_of("room", self.room, ("", *PLACES))
 

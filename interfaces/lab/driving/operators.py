@@ -115,8 +115,8 @@ _ASIDE: Final = math.radians(50)
 class Operator(Protocol):
     """Somebody who drives the virtual robot.
 
-    One that has `sees_real` set is shown where the real robot was reported last, instead; one that comes to have
-    `finished` set drives no more.
+    One that has `sees_estimate` set is shown it where the posture estimator moves it; one that has `sees_real` set
+    is shown where the real robot was reported last, instead; one that comes to have `finished` set drives no more.
     """
 
     @property

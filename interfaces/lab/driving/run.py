@@ -16,7 +16,7 @@ from interfaces.lab.driving.operators import Operator, operator
 from interfaces.link.conditions import Conditions, LinkConditions
 from interfaces.link.delays import delay_profile
 from interfaces.link.link import Link
-from interfaces.runs.drive_run import DriveCase, DriveLink, DriveRun, Row, Witness, row_of
+from interfaces.runs.drive_run import KNOWN, SENSED, DriveCase, DriveLink, DriveRun, Row, Witness, row_of
 from interfaces.teleop.architectures import (
     ArchitectureRobotSite,
     TimelineController,
@@ -98,7 +98,8 @@ def _driven(
     model = replace(case.real[0].base, period=constants.period)
     made = controller(case.architecture, driver.start, constants)
     senses = architecture(case.architecture).senses
-    there = operator_surroundings(body.room, driver.start, model) if senses else None
+    held = case.environment or (SENSED if senses else "")
+    there = operator_surroundings(body.room, driver.start, model, learns=held != KNOWN) if held else None
     here = robot_surroundings(body, driver.start, made, CONTROL) if senses else None
     virtual = VirtualBase(
         model, driver.start, now=0.0, around=lambda _: there, transport=case.transport, matched=False
@@ -125,7 +126,7 @@ def _driven(
         now, send = k * CONTROL, k % every == 0
         virtual.ended = k >= driving
         if send and not virtual.ended:
-            wanted = driver.drive(now, _seen(driver, operator, site.posture), site.before)
+            wanted = driver.drive(now, _seen(driver, operator), site.before)
             if getattr(driver, "finished", False):
                 driving = k + every
             wanted = STAND if now >= case.length - STOPPING else wanted
@@ -188,10 +189,13 @@ def _driven(
     )
 
 
-def _seen(driver: Operator, site: OperatorSite[VirtualBase], virtual: Posture) -> Posture:
+def _seen(driver: Operator, site: OperatorSite[VirtualBase]) -> Posture:
     """Where an operator sees the robot that he looks at."""
+    virtual = site.robot.architecture
+    if getattr(driver, "sees_estimate", False):
+        return Posture(*virtual.estimator.posture.tolist())
     if not getattr(driver, "sees_real", False):
-        return virtual
+        return virtual.posture
     newest = site.report
     return driver.start if newest is None or newest.report is None else Posture(*newest.report.posture)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from interfaces.lab.claims import Paper, PaperPart
-from interfaces.lab.kim2006 import links, packets
+from interfaces.lab.kim2006 import causes, links, packets
 
 PAPER: Final = Paper(
     "kim2006",
@@ -14,6 +14,7 @@ PAPER: Final = Paper(
     (
         PaperPart("Variable packet size", packets.work),
         PaperPart("Path following", links.work, links.conclude, links.CASES),
+        PaperPart("Causes", causes.work, causes.conclude, causes.CASES),
         PaperPart("Size alone", links.work_sizes, links.conclude_sizes, links.SIZE_CASES),
         PaperPart("Narrow links", links.work_narrow, links.conclude_narrow, links.NARROW_CASES),
     ),

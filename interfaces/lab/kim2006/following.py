@@ -37,7 +37,7 @@ TICK: Final = 0.02
 SPEED: Final = 0.15
 """Of the robot along the path [m/s]."""
 RECOVERY: Final = 0.12
-"""λ: over what way the local system leads the robot back to the path [m]."""
+"""λ of the comparison: over what way the local system leads the robot back to the path [m]."""
 BRAKING: Final = 0.06
 """Over what way it slows down before the path's end [m]."""
 FIRE: Final = 0.5
@@ -68,6 +68,8 @@ class FollowingCase:
     """Of either direction [bit/s]."""
     adaptive: bool = False
     """Whether RSP fits T to the link."""
+    recovery: Annotated[float, within(0.01, 100.0, "m")] = RECOVERY
+    """λ: over what way the local system leads the robot back to the path [m], in [0.01, 100]."""
     music: Annotated[float, within(0.0, 1.0)] = 0.0
     """Share of the time in which music plays, in [0, 1]."""
 
@@ -128,7 +130,7 @@ def course(seed: int, length: float) -> Array:
     return np.vstack(([0.0, 0.0], np.cumsum(steps, axis=0)))
 
 
-def path_leader(path: Array) -> Callable[[Posture], Rims]:
+def path_leader(path: Array, recovery: float = RECOVERY) -> Callable[[Posture], Rims]:
     """The local system's controller: the path's own curvature, and what brings the robot back.
 
     For l beside the path, along the way s: d²l/ds² + 2/λ dl/ds + l/λ² = 0. The robot is back after a few λ, without
@@ -136,6 +138,7 @@ def path_leader(path: Array) -> Callable[[Posture], Rims]:
 
     Args:
         path: At whose start the robot begins.
+        recovery: λ [m].
 
     Returns:
         What the wheels are to do [mm/s], from where the robot was seen.
@@ -143,7 +146,7 @@ def path_leader(path: Array) -> Callable[[Posture], Rims]:
     steps = np.diff(path, axis=0)
     headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     curvature = np.gradient(headings, SPEED * TICK)
-    at, reach = 0, round(3 * RECOVERY / (SPEED * TICK))
+    at, reach = 0, round(3 * recovery / (SPEED * TICK))
 
     def rims(seen: Posture) -> Rims:
         nonlocal at
@@ -156,8 +159,8 @@ def path_leader(path: Array) -> Callable[[Posture], Rims]:
         angle = wrapped(seen.theta - heading)
         left = SPEED * TICK * (len(path) - at)
         v = SPEED * max(math.cos(angle), 0.0) * min(1.0, left / BRAKING)
-        back = clipped(beside / RECOVERY, 2.0) + 2.0 * angle
-        w = clipped(SPEED * (float(curvature[at]) - back / RECOVERY), 0.5 * p.LIMITS.w_max)
+        back = clipped(beside / recovery, 2.0) + 2.0 * angle
+        w = clipped(SPEED * (float(curvature[at]) - back / recovery), 0.5 * p.LIMITS.w_max)
         half = 0.5 * w * p.WHEEL_BASE
         return round(1000 * (v - half)), round(1000 * (v + half))
 
@@ -211,7 +214,7 @@ def run(case: FollowingCase) -> Followed:
     )
     link: Link[bytes, bytes] = Link(LinkConditions.symmetric(conditions), np.random.default_rng([case.seed, 2]))
     path = course(case.seed, case.length)
-    lead = path_leader(path)
+    lead = path_leader(path, case.recovery)
     way: list[tuple[float, ...]] = []
     given: list[float] = []  # when each command was [s]
     fired: dict[int, float] = {}  # when each was carried out [s]

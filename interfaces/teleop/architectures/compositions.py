@@ -145,20 +145,24 @@ def grid_of(room: Room, start: Posture) -> Grid:
     return Grid((m, n), CELL)
 
 
-def operator_surroundings(room: Room, start: Posture, model: MobileBase) -> OperatorSurroundings:
+def operator_surroundings(
+    room: Room, start: Posture, model: MobileBase, *, learns: bool = True
+) -> OperatorSurroundings:
     """The virtual environment with the room's known map, and what keeps the virtual robot out of it.
 
     Args:
         room: Where the real robot drives.
         start: Where both robots begin.
         model: The virtual robot.
+        learns: Whether what the real robot senses is added.
     """
     grid = grid_of(room, start)
     known = _known(room, grid, 0.0)
     environment = VirtualEnvironment(grid.shape, cell=grid.cell, origin=grid.origin, walls=known)
     outline = outline_of(model.body)
     radius = math.hypot(max(outline.front, outline.rear), model.body.width / 2) + MARGIN
-    return OperatorSurroundings(environment, Avoidance(model.limits, radius, period=model.period))
+    avoidance = Avoidance(model.limits, radius, period=model.period)
+    return OperatorSurroundings(environment, avoidance, learns=learns)
 
 
 def robot_surroundings(

@@ -29,9 +29,15 @@ class OperatorSurroundings:
     they come. The robot's clock needn't be the operator's: a report that came as quickly as any is taken as of now.
     """
 
-    def __init__(self, environment: VirtualEnvironment, avoidance: Avoidance) -> None:
-        """Take the environment with the known map, and what keeps the virtual robot out of its cells."""
-        self.environment = environment
+    def __init__(self, environment: VirtualEnvironment, avoidance: Avoidance, *, learns: bool = True) -> None:
+        """Take the environment with the known map, and what keeps the virtual robot out of its cells.
+
+        Args:
+            environment: With the known map.
+            avoidance: Keeps the virtual robot out of its cells.
+            learns: Whether what the real robot senses is added to it.
+        """
+        self.environment, self._learns = environment, learns
         self._avoidance = avoidance
         self._offset = math.inf
         self._last: dict[tuple[int, int], CellChange] = {}
@@ -45,6 +51,8 @@ class OperatorSurroundings:
             said_at: When the robot said it, by its own clock [s].
             now: By the operator's clock [s], not before an earlier call's.
         """
+        if not self._learns:
+            return
         environment = self.environment
         self._offset = min(self._offset, now - said_at)
         # What was seen before this can't live any more, whatever a late report says of it.

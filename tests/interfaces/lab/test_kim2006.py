@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 import pytest
 
 from interfaces.lab.claims import Claim, Results, Study, Verdict
-from interfaces.lab.kim2006 import PAPER, links, packets
+from interfaces.lab.kim2006 import PAPER, causes, links, packets
 from interfaces.lab.kim2006.following import RESEND, Followed, FollowingCase, course, path_leader, resend_after, run
 from interfaces.lab.kim2006.links import pair, verdict
 from interfaces.lab.kim2006.schemes import SCHEMES
@@ -18,6 +19,7 @@ from robots.onboard.driving import Posture
 from vrs.errors import InvalidValueError
 
 SMALL = Study(seed=0, runs=2, length=3.0)
+Pairs: TypeAlias = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 def test_the_first_experiments_packets_have_34_and_1992_bytes_and_save_what_the_paper_says() -> None:
@@ -189,6 +191,23 @@ def test_on_a_narrow_link_it_is_the_size() -> None:
     planted(claims, lacking)
 
 
+def test_led_back_over_a_longer_way_rsp_keeps_the_path_at_the_moons_distance() -> None:
+    case = FollowingCase("rsp", "lunar", 0.1, 1, 30.0, "bare")
+    short, far = (run(replace(case, recovery=recovery)) for recovery in (case.recovery, causes.FAR))
+    assert far.progress > 3 * short.progress
+
+
+def test_causes_are_concluded_by_what_they_leave() -> None:
+    def made(pairs: Pairs, streamed: Pairs) -> tuple[Results, ...]:
+        return (Results(pairs=pairs, streamed=streamed, progress=[0.9, 0.2]),) * len(causes.CASES)
+
+    apart, alike = ((0.01, 0.011), (0.02, 0.021)), ((0.02, 0.021), (0.02, 0.021))
+    claims = causes.conclude(SMALL, made(apart, alike)).claims
+    planted(claims, causes.conclude(SMALL, made(alike, alike)).claims)
+    assert all(claim.is_ours for claim in claims)
+    assert causes.conclude(SMALL, made(((), ()), alike)).tables[0].rows[0][3:7] == (None, None, None, 0)
+
+
 def test_packets_of_one_size_save_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(packets, "LENGTH", 12.0)
     found = packets.work(SMALL, "").claims
@@ -222,6 +241,7 @@ def test_the_paper_is_in_the_list() -> None:
     assert [part.title for part in PAPER.parts] == [
         "Variable packet size",
         "Path following",
+        "Causes",
         "Size alone",
         "Narrow links",
     ]

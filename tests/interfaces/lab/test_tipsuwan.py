@@ -269,8 +269,17 @@ def test_other_controllers_go_behind_it():
         else:
             results.append(results[-1])
     found = wrapping.conclude(SMALL, tuple(results))
-    assert all(claim.met for claim in found.claims)
-    assert len(found.tables[0].rows) == 3 * len(wrapping.CASES)
+    ours = {claim.claim: claim for claim in found.claims if claim.is_ours}
+    assert all(claim.met for claim in found.claims if not claim.is_ours)
+    # Going slowly all along does as well: it's not shown that it's the middleware.
+    assert {claim.verdict for claim in found.claims if not claim.is_ours} == {Verdict.NOT_SHOWN}
+    assert [claim.met for text, claim in ours.items() if "kinematic" in text] == [False, True, True]
+    assert len(found.tables[0].rows) == 4 * len(wrapping.CASES)
+
+
+def test_a_paced_controllers_curves_are_the_same():
+    paced = wrapping.paced(lambda _: (1.0, 0.5), 0.4)
+    assert paced(None) == pytest.approx((0.4, 0.2))
 
 
 def test_the_arcs_of_a_curve_lie_along_it():
@@ -332,11 +341,19 @@ def test_a_guard_that_lets_too_much_pass_fails(monkeypatch):
 
 
 def test_a_controller_that_is_no_better_behind_the_middleware_fails():
-    runs = {"without": (GOOD["without"],) * 4, "with": (GOOD["behind"],) * 4}
-    assert wrapping.wrapping_claim("ipr/one", runs, 0).met
-    assert wrapping.wrapping_claim("ipr/one", runs, 0).measured == pytest.approx(0.2)
-    worse = (*(GOOD["behind"],) * 3, GOOD["behind"]._replace(error=0.4))
-    assert not wrapping.wrapping_claim("ipr/one", runs | {"with": worse}, 0).met
+    behind, without = GOOD["behind"], GOOD["without"]
+    runs = {"without": (without,) * 4, "with": (behind,) * 4, wrapping.SLOW: (without,) * 4}
+    less, than_slow = wrapping.wrapping_claims("ipr/one", runs, 0)
+    assert (less.holds, than_slow.holds) == (True, True)
+    assert (less.measured, less.is_ours, than_slow.is_ours) == (pytest.approx(8.0), False, True)
+    # Off: it's as without; or as one that is only slow.
+    for off in (without, without._replace(error=0.2)):
+        assert not any(claim.met for claim in wrapping.wrapping_claims("ipr/one", runs | {"with": (off,) * 4}, 0))
+    worse = (*(behind,) * 3, behind._replace(error=0.4))
+    assert not wrapping.wrapping_claims("ipr/one", runs | {"with": worse}, 0)[0].met
+    slow = runs | {wrapping.SLOW: (behind,) * 4}
+    less, than_slow = wrapping.wrapping_claims("ipr/one", slow, 0)
+    assert (less.verdict, than_slow.verdict) == (Verdict.NOT_SHOWN, Verdict.FAILS)
 
 
 @pytest.mark.parametrize(("arrivals", "error", "letter"), [
