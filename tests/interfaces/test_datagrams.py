@@ -419,11 +419,20 @@ def test_both_sites_live_by_tls_and_what_is_said(shown: tuple[Certificate, Certi
         context = robots.server_context(operators.chain)
         async with live_rig.robot_here(tls=context, datagrams=beside) as (robot, url):
             at = f"{url}#sha256={robots.fingerprint}"
+            receive, numbers = robot.host.receive, []
+
+            def heard(message: Any, *, now: float) -> None:
+                numbers.append((type(message), message.number))
+                receive(message, now=now)
+
+            robot.host.receive = heard  # type: ignore[method-assign]
             async with live_rig.operator_here(at, certificate=operators, blocked=said.append) as (operator, _):
                 client = operator.robot
                 wanted = DatagramState.THROUGH if not beside else DatagramState.BLOCKED
                 await live_rig.until(lambda: client.datagrams is wanted and operator.operator.report is not None)
-                await live_rig.until(lambda: not beside or said)
+                await live_rig.until(lambda: (not beside or said) and len(numbers) > ALONE)
+                await asyncio.sleep(0.3)
+                assert max(Counter(numbers).values()) == 1, "no copy is given to the robot's site"
                 attached = client.attached
                 assert attached is not None
                 assert attached.datagrams == "", "nobody needs the secret any more"
