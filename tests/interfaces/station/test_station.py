@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -12,11 +11,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from axe_core_python.sync_playwright import Axe
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from tests.interfaces.live_rig import Child
+from tests.interfaces.pages import accessible
 from tests.interfaces.station.opened import Page, paged, station, until
 
 TOOL = "station.drag.tool()"
@@ -397,12 +396,9 @@ def test_everyone_can_use_it(browser: Any, server: Child, scheme: str, width: in
         page.open().take_control().rest()
         plan(page, "nominal" if page.virtual[1] > 1.2 else "ready", 30)
         page.shoot(scheme)
-        axe = Axe()
         for tab in ("jog", "receipts", "network"):
             page.page.click(f"#tab-{tab}")
-            found = axe.run(page.page)["violations"]
-            grave = [one for one in found if one["impact"] in {"serious", "critical"}]
-            assert json.dumps([(one["id"], [node["html"] for node in one["nodes"]]) for one in grave]) == "[]"
+            accessible(page.page)
         assert page.get("document.documentElement.dataset.theme") == scheme
         size = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
         assert page.get(size) == [width, height]

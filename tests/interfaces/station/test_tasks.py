@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_core_python.sync_playwright import Axe
 
 from robots import mobile
 from tests.interfaces.live_rig import Child, child
+from tests.interfaces.pages import accessible
 from tests.interfaces.station.opened import Page, paged, station
 from tests.interfaces.station.test_notices import told
 
@@ -58,11 +58,6 @@ def real(page: Page) -> list[float]:
     return found
 
 
-def accessible(page: Page) -> None:
-    found = Axe().run(page.page, context="#side")["violations"]
-    assert found == [], [(v["id"], v["nodes"][0]["html"]) for v in found]
-
-
 def test_a_click_on_the_map_sends_the_robot_there_and_a_drag_says_how_it_stands(page: Page) -> None:
     page.page.click("#tab-map")
     page.wait("Boolean(document.querySelector('.plan-things')?.getAttribute('d'))")
@@ -76,7 +71,7 @@ def test_a_click_on_the_map_sends_the_robot_there_and_a_drag_says_how_it_stands(
     page.wait("station.session.tasks.doing === 'goal'")
     page.wait("station.session.tasks.route?.length >= 2")
     page.shoot("map")
-    accessible(page)
+    accessible(page.page, "#side")
     assert "On its way" in page.page.locator("#journey").text_content()
     page.wait("station.session.tasks.journey === 'arrived'")
     x, y, theta = real(page)
@@ -156,7 +151,7 @@ def test_the_papers_scenario_is_listed_tried_and_done(page: Page, kept: Path) ->
     page.wait("said.has('Hello!')")
     page.wait("document.getElementById('robot-screen').textContent === 'Please put the book on my top side!'")
     page.shoot("jobs")
-    accessible(page)
+    accessible(page.page, "#side")
     page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.press("Enter")
     page.wait("station.session.tasks.progress.jobs[4].stage === 'running'")

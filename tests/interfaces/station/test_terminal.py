@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_core_python.sync_playwright import Axe
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -16,6 +15,7 @@ from interfaces.messages.control import Role
 from interfaces.stream.access import make_tokens
 from interfaces.val2.pages import LARGEST
 from tests.interfaces.live_rig import Child, child
+from tests.interfaces.pages import accessible
 from tests.interfaces.station.opened import PATIENCE, SERVE, Page, paged, station
 
 TEXT = "station.terminal.text"
@@ -148,9 +148,7 @@ def test_who_only_watches_and_who_has_no_control(browser: Any, tokens: tuple[Pat
             assert viewer.page.locator(".programs").is_hidden()
             assert "*No control*" in said(viewer, "do ready", "only looks\n.")
             assert "X/JT1" in said(viewer, "where", "HAND")
-            found = Axe().run(viewer.page)["violations"]
-            grave = [one for one in found if one["impact"] in {"serious", "critical"}]
-            assert json.dumps([(one["id"], [node["html"] for node in one["nodes"]]) for one in grave]) == "[]"
+            accessible(viewer.page)
             with paged(browser, station(server)) as second:
                 terminal(enter(second, known[Role.OPERATOR]))
                 before = page.virtual
