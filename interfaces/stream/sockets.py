@@ -21,6 +21,7 @@ from uvicorn.server import ServerState
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
+from interfaces.stream.access import ENDED
 from interfaces.stream.limits import Bucket, Strangers
 from interfaces.system import open_files
 from vrs.checks import validated, within
@@ -47,6 +48,8 @@ TURNS = 4
 """Connections with HTTP that are served in one round of the loop."""
 CUT_OFF = 8
 """Connections that are cut off in one round of the loop."""
+PEOPLE = 1.0
+"""So often it's looked whether what a WebSocket was let in by counts still [s]."""
 _LOOK = 0.1
 """Time between two looks at deadlines [s]."""
 CHUNK = 512
@@ -122,6 +125,8 @@ class ConnectionState(ServerState):
         self.strangers: Strangers[_Bounded | _Handshake] = Strangers(
             max(1, min(limits.strangers, open_files(FILES) // 4))
         )
+        self.admitted: dict[BoundedWebSocket, tuple[Callable[[], bool], int]] = {}
+        """WebSockets that were let in: whether what they showed counts still, and the close code if it doesn't."""
 
 
 class _Bounded(asyncio.Protocol):
@@ -278,6 +283,7 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Let it go."""
         super().connection_lost(exc)
+        self._state.admitted.pop(self, None)
         # The parser is a generator that holds what holds it.
         self.conn.parser.close()
 
@@ -335,13 +341,22 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
             return False
         if allowed.take(self.loop.time()):
             return True
+        self.end(CloseCode.POLICY_VIOLATION, "too many pings and parts of messages")
+        return False
+
+    def end(self, code: int, reason: str) -> None:
+        """Close the connection, whatever the application is at.
+
+        Args:
+            code: Close code of WebSocket.
+            reason: Why, for people; up to 123 bytes.
+        """
         if not self.close_sent:
-            self.conn.fail(CloseCode.POLICY_VIOLATION, "too many pings and parts of messages")
+            self.conn.fail(code, reason)
             self.transport.write(b"".join(self.conn.data_to_send()))
             self.close_sent = True
         self.transport.close()
         self._begin_phase(FAREWELL)
-        return False
 
     async def receive(self) -> ASGIReceiveEvent:
         """Take the next message; more is read when all that were have been taken."""
@@ -365,15 +380,32 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         del self.scope["state"]["socket"]
         self._begin_phase(FAREWELL)
 
-    def let_stay(self, *, known: bool) -> None:
-        """Give the connection the sizes that who is known may send, and hold its deadlines off."""
+    def let_stay(
+        self, *, known: bool, counts: Callable[[], bool] | None = None, code: int = CloseCode.POLICY_VIOLATION
+    ) -> None:
+        """Give the connection the sizes that who is known may send, and hold its deadlines off.
+
+        Args:
+            known: Whether it has shown who it is.
+            counts: Whether what it has shown counts still: the connection ends a second after it doesn't. None: the
+                application sees to that.
+            code: Close code then.
+        """
         if known:
             self.conn.max_message_size = self.config.ws_max_size
             self._state.strangers.know(self)
+        if counts is not None:
+            self._state.admitted[self] = counts, code
         self._begin_phase()
 
     async def send(self, message: ASGISendEvent) -> None:
-        """Send a message of the application; a farewell has its time."""
+        """Send a message of the application; a farewell has its time.
+
+        Raises:
+            ConnectionResetError: If the connection was closed by itself.
+        """
+        if self.close_sent:
+            raise ConnectionResetError
         await super().send(message)
         if message["type"] == "websocket.close":
             self._begin_phase(FAREWELL)
@@ -406,16 +438,20 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         return self.transport.get_write_buffer_size()
 
 
-def let_stay(scope: Scope, *, known: bool) -> None:
+def let_stay(
+    scope: Scope, *, known: bool, counts: Callable[[], bool], code: int = CloseCode.POLICY_VIOLATION
+) -> None:
     """Let whoever is at the other side of an application's WebSocket stay.
 
     Args:
         scope: The application's. Nothing happens where another server than `serve` has it.
         known: Whether it has shown who it is; else it stays as long as nobody else needs its place.
+        counts: Whether what it has shown counts still: the connection ends a second after it doesn't.
+        code: Close code then.
     """
     connection = scope.get("state", {}).get("socket")
     if isinstance(connection, BoundedWebSocket):
-        connection.let_stay(known=known)
+        connection.let_stay(known=known, counts=counts, code=code)
 
 
 def bind(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
@@ -455,7 +491,7 @@ async def serve(
     *,
     largest: int = LARGEST_MESSAGE,
     limits: SocketLimits | None = None,
-    tls: ssl.SSLContext | None = None,
+    tls: Callable[[], ssl.SSLContext] | None = None,
 ) -> AsyncIterator[None]:
     """Serve an ASGI application on a socket, which is closed in the end, with all its connections.
 
@@ -464,7 +500,7 @@ async def serve(
         listening: From `bind`.
         largest: Largest message that is received [bytes].
         limits: Of connections.
-        tls: What TLS is spoken by, from `Certificate.server_context`; None: nothing is encrypted.
+        tls: Gives what a handshake is done by, as `ServerTls.context` does; None: nothing is encrypted.
     """
     config = uvicorn.Config(
         app,  # type: ignore[arg-type]
@@ -484,7 +520,7 @@ async def serve(
     # Signals are left to whoever runs it.
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
-    looking = asyncio.create_task(_cut_off_overdue(state))
+    looking = [asyncio.create_task(look(state)) for look in (_cut_off_overdue, _end_admissions)]
     task = asyncio.create_task(server.serve(sockets=[listening] if tls is None else []))
     try:
         while not server.started and not task.done():
@@ -494,7 +530,8 @@ async def serve(
                 await doors.enter_async_context(_tls_door(listening, tls, server, state))
             yield
     finally:
-        looking.cancel()
+        for one in looking:
+            one.cancel()
         server.should_exit = True
         connections = server.server_state.connections
         asyncio.get_running_loop().call_later(_GRACE, _abort_all, connections)
@@ -504,7 +541,7 @@ async def serve(
 
 @contextlib.asynccontextmanager
 async def _tls_door(
-    listening: socket.socket, tls: ssl.SSLContext, server: uvicorn.Server, state: ConnectionState
+    listening: socket.socket, tls: Callable[[], ssl.SSLContext], server: uvicorn.Server, state: ConnectionState
 ) -> AsyncIterator[None]:
     """Take connections that speak TLS, and give them to the server when they have shaken hands."""
     loop = asyncio.get_running_loop()
@@ -518,7 +555,7 @@ async def _tls_door(
             await loop.connect_accepted_socket(
                 http,
                 connection,
-                ssl=tls,
+                ssl=tls(),
                 ssl_handshake_timeout=state.limits.handshake,
                 ssl_shutdown_timeout=FAREWELL,
             )
@@ -564,6 +601,14 @@ async def _cut_off_overdue(state: ConnectionState) -> None:
                 connection.abort()
             # A thousand may be overdue at once: others have their turn in between.
             await asyncio.sleep(0)
+
+
+async def _end_admissions(state: ConnectionState) -> None:
+    while True:
+        await asyncio.sleep(PEOPLE)
+        for connection, (counts, code) in list(state.admitted.items()):
+            if not counts():
+                connection.end(code, ENDED)
 
 
 def _abort_all(connections: Iterable[object]) -> None:

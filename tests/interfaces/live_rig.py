@@ -92,22 +92,22 @@ async def robot_here(
     made = PhysicsBody(PhysicsConfig(ROBOT, NOMINAL, body), host)
     robot = LiveRobot(made, Access(free={Role.SITE}) if access is None else access, audit=audit)
     app = application(robot.routes, hosts(["127.0.0.1"], port))
-    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running():
+    shaking = None if tls is None else lambda: tls
+    async with sockets.serve(app, listening, largest=LARGEST, tls=shaking), robot.running():
         await robot.ready()
         yield robot, f"{'ws' if tls is None else 'wss'}://127.0.0.1:{port}/site"
 
 
 @contextlib.asynccontextmanager
 async def operator_here(
-    url: str, *, delay: str = "none", certificate: Certificate | None = None
+    url: str, *, delay: str = "none", certificate: Certificate | None = None, token: str | None = None
 ) -> AsyncIterator[tuple[LiveOperator, str]]:
     """An operator's site in this loop, and its URL for programs."""
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    operator = LiveOperator(
-        LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate), Access(free=OPEN)
-    )
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate, robot_token=token)
+    operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():
         yield operator, f"ws://127.0.0.1:{port}/ws"

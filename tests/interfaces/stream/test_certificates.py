@@ -9,6 +9,7 @@ import json
 import socket
 import ssl
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,14 @@ from interfaces.cli.options import certificate_for, names_of
 from interfaces.messages.control import Role
 from interfaces.stream import certificates
 from interfaces.stream.access import Access, make_tokens
-from interfaces.stream.certificates import Certificate, given_certificate, own_certificate, peer, server_url
+from interfaces.stream.certificates import (
+    Certificate,
+    ServerTls,
+    given_certificate,
+    own_certificate,
+    peer,
+    server_url,
+)
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.sockets import SocketLimits
 from tests.interfaces import live_rig
@@ -334,3 +342,58 @@ def test_the_sites_know_each_other_by_certificates(shown: Certificate, other: Ce
             assert "certificate" in await met(port, shown, stranger)
 
     asyncio.run(main())
+
+
+def test_a_renewed_certificate_counts_from_the_next_handshake(
+    tmp_path: Path, shown: Certificate, other: Certificate
+) -> None:
+    chain, key, said = tmp_path / "chain.pem", tmp_path / "key.pem", list[str]()
+
+    def write(certificate: Certificate, *files: Path) -> None:
+        for file in files:
+            file.write_bytes(certificate.chain.read_bytes())
+
+    write(shown, chain, key)
+    tls = ServerTls(given_certificate(chain, key), say=said.append)
+    with served(shaking=tls.context) as serving:
+        with connect(address(serving.port, shown)) as robot:
+            write(other, chain)
+            # Its key isn't there yet.
+            connect(address(serving.port, shown)).close()
+            connect(address(serving.port, shown)).close()
+            assert len(said) == 1
+            assert "the certificate from before is shown" in said[0]
+            write(other, key)
+            connect(address(serving.port, other)).close()
+            assert said[1] == f"certificate {chain} is read again, SHA-256 {other.shown}"
+            assert robot.is_connected
+        with pytest.raises(UnreachableError, match="its certificate is another"):
+            connect(address(serving.port, shown))
+        chain.unlink()
+        connect(address(serving.port, other)).close()
+        assert "No such file" in said[2]
+
+
+def test_a_site_whose_certificate_was_replaced_comes_in_no_more(tmp_path: Path, shown: Certificate) -> None:
+    old = own_certificate(tmp_path / "site.pem", (), client=True)
+    kept = replace(old, chain=tmp_path / "old.pem", key=tmp_path / "old.pem")
+    kept.chain.write_bytes(old.chain.read_bytes())
+    tls = ServerTls(shown, old.chain)
+    with served(shaking=tls.context) as serving:
+
+        def asked(own: Certificate) -> int:
+            context = willing()
+            context.load_cert_chain(own.chain, own.key)
+            line = http.client.HTTPSConnection("127.0.0.1", serving.port, context=context)
+            try:
+                line.request("GET", "/health")
+                return line.getresponse().status
+            finally:
+                line.close()
+
+        assert asked(kept) == 200
+        old.chain.unlink()
+        new = own_certificate(old.chain, (), client=True)
+        assert asked(new) == 200
+        with pytest.raises((ssl.SSLError, ConnectionError, http.client.HTTPException)):
+            asked(kept)
