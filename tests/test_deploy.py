@@ -59,7 +59,7 @@ def analyzed(*words: str) -> subprocess.CompletedProcess[str]:
 
 @needs_systemd
 @pytest.mark.parametrize("name", UNITS)
-def test_systemd_finds_units_sound_and_little_exposed(name: str, tmp_path: Path) -> None:
+def test_t19_systemd_finds_units_sound_and_little_exposed(name: str, tmp_path: Path) -> None:
     installed = tmp_path / name
     program = Path(sys.executable).with_name("vrs")
     installed.write_text((DEPLOY / name).read_text().replace("/opt/vrs-teleop/.venv/bin/vrs", str(program)))
@@ -78,7 +78,7 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", UNITS)
-def test_a_unit_gives_up_what_it_doesnt_need(name: str) -> None:
+def test_t19_a_unit_gives_up_what_it_doesnt_need(name: str) -> None:
     parser = configparser.ConfigParser(strict=False, interpolation=None)
     parser.optionxform = str  # type: ignore[assignment, method-assign]
     assert parser.read(DEPLOY / name)
@@ -93,7 +93,7 @@ def test_a_unit_gives_up_what_it_doesnt_need(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_container_gives_up_what_it_doesnt_need(name: str) -> None:
+def test_t19_a_container_gives_up_what_it_doesnt_need(name: str) -> None:
     found = service(name)
     assert found["read_only"] is True
     assert found["cap_drop"] == ["ALL"]
@@ -144,7 +144,7 @@ def free_port() -> str:
 
 
 @pytest.mark.parametrize("name", [*UNITS, *SERVICES])
-def test_what_is_run_is_well_and_ends_when_told(name: str, tmp_path: Path) -> None:
+def test_t19_what_is_run_is_well_and_ends_when_told(name: str, tmp_path: Path) -> None:
     port, old = free_port(), "8601" if "robot" in name else "8600"
 
     def here(word: str) -> str:

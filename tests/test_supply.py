@@ -101,7 +101,7 @@ def problem(name: str, licences: list[str]) -> str:
     return ""
 
 
-def test_all_that_is_installed_has_a_licence_that_is_allowed() -> None:
+def test_t18_all_that_is_installed_has_a_licence_that_is_allowed() -> None:
     found = installed(everything())
     assert {"numpy", "websockets", "uvicorn"} <= set(found)
     assert [said for name, one in found.items() if (said := problem(name.lower(), stated(one)))] == []
@@ -115,7 +115,7 @@ def test_another_licence_is_found(licence: str) -> None:
     assert not problem("somebody-s", ["GPL-3.0-only OR MIT"])
 
 
-def test_everything_pinned_has_hashes_and_everything_used_is_pinned(install: ModuleType) -> None:
+def test_t18_everything_pinned_has_hashes_and_everything_used_is_pinned(install: ModuleType) -> None:
     pinned = install.pinned((HOME / "constraints.txt").read_text())
     known = install.hashed((HOME / "hashes.txt").read_text())
     assert set(known) == {f"{name}=={version}" for name, version in pinned.items()}
@@ -126,7 +126,7 @@ def test_everything_pinned_has_hashes_and_everything_used_is_pinned(install: Mod
     assert wanted <= set(pinned)
 
 
-def test_versions_without_a_hash_arent_installed(install: ModuleType) -> None:
+def test_t18_versions_without_a_hash_arent_installed(install: ModuleType) -> None:
     known = {"numpy==2.4.6": ["sha256:" + 64 * "0", "sha256:" + 64 * "1"]}
     text = install.locked({"numpy": "2.4.6"}, known)
     assert text == f"numpy==2.4.6 --hash=sha256:{64 * '0'} --hash=sha256:{64 * '1'}\n"

@@ -106,7 +106,7 @@ def val_terminal(place: Place, token: str) -> socket.socket:
     return line
 
 
-def test_all_that_a_token_opened_ends_with_it_and_nothing_else_does(place: Place) -> None:
+def test_t05_all_that_a_token_opened_ends_with_it_and_nothing_else_does(place: Place) -> None:
     ada = add_person(place.tokens, "ada", Role.OPERATOR, "2090-01-31")
     viewer = read_tokens(place.tokens)[Role.VIEWER]
     with ExitStack() as stack:
@@ -126,7 +126,7 @@ def test_all_that_a_token_opened_ends_with_it_and_nothing_else_does(place: Place
         assert {door: left(line, time.monotonic() + 0.05) for door, line in others.items()} == dict.fromkeys(DOORS)
 
 
-def test_a_ticket_ends_with_its_token_and_follows_no_exchanged_link(place: Place) -> None:
+def test_t05_a_ticket_ends_with_its_token_and_follows_no_exchanged_link(place: Place) -> None:
     bo, viewer = add_person(place.tokens, "bo", Role.VIEWER, "2090-01-31"), read_tokens(place.tokens)[Role.VIEWER]
     kept, secret = place.folder / "recordings" / "kept.mcap", place.folder / "audit.jsonl"
 
@@ -164,7 +164,7 @@ def test_a_ticket_ends_with_its_token_and_follows_no_exchanged_link(place: Place
         moved.unlink()
 
 
-def test_every_doors_refusals_are_in_the_log(place: Place) -> None:
+def test_t14_every_doors_refusals_are_in_the_log(place: Place) -> None:
     wrong, viewer = "x" * 43, read_tokens(place.tokens)[Role.VIEWER]
     asked = [
         ("GET", "/poses"), ("POST", "/poses"), ("GET", "/plan"), ("POST", "/plan"), ("POST", "/recordings"),
@@ -201,14 +201,14 @@ def test_every_doors_refusals_are_in_the_log(place: Place) -> None:
     assert known["audit"] == {"problem": "", "lost": 0}
 
 
-def test_a_log_is_written_by_one_server(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
+def test_t14_a_log_is_written_by_one_server(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
     log = place.folder / "audit.jsonl"
     assert exit_status(["robot", "--audit", str(log), "--listen", "127.0.0.1:0"]) == 2
     assert "another process writes it" in capsys.readouterr().err
     assert check_audit(log).problem == ""
 
 
-def test_a_robot_lets_a_site_go_whose_token_has_ended(tmp_path: Path) -> None:
+def test_t05_a_robot_lets_a_site_go_whose_token_has_ended(tmp_path: Path) -> None:
     tokens = tmp_path / "tokens"
     token = add_person(tokens, "lab", Role.SITE, "2090-01-31")
 

@@ -24,7 +24,7 @@ from vrs.errors import FormatError, InvalidValueError
 TOKENS = {Role.VIEWER: "v" * 43, Role.OPERATOR: "o" * 43, Role.ADMIN: "a" * 43, Role.SITE: "s" * 43}
 
 
-def test_a_token_opens_its_role_and_those_below():
+def test_t03_a_token_opens_its_role_and_those_below():
     access = Access(TOKENS, free=())
     opens = {(owner, role) for owner in Role for role in Role if not access.refusal(role, TOKENS[owner])}
     assert opens == {
@@ -39,7 +39,7 @@ def test_a_token_opens_its_role_and_those_below():
 
 
 @pytest.mark.parametrize("token", [None, "", "x" * 43, "a" * 42, "a" * 44, "a" * 100_000, "ä" * 43])
-def test_nothing_else_opens_anything(token):
+def test_t03_nothing_else_opens_anything(token):
     access = Access(TOKENS, free=())
     assert access.needs_tokens
     assert all(access.refusal(role, token) for role in Role)
@@ -56,7 +56,7 @@ def test_on_the_loopback_all_but_admins_and_sites_need_none():
         Access(free={Role.ADMIN})
 
 
-def test_a_token_shows_nowhere():
+def test_t04_a_token_shows_nowhere():
     access = Access(TOKENS, free=())
     said = [repr(access), str(vars(access)), *(access.refusal(role, "b" * 43) for role in Role)]
     assert not any(token in text for token in [*TOKENS.values(), "b" * 43] for text in said)
@@ -105,7 +105,7 @@ def test_a_made_file_is_read_back(tmp_path):
 
 
 @pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o660, 0o400, 0o700])
-def test_a_file_that_others_may_read_is_refused(tmp_path, mode):
+def test_t04_a_file_that_others_may_read_is_refused(tmp_path, mode):
     path = tmp_path / "tokens"
     make_tokens(path)
     path.chmod(mode)

@@ -86,7 +86,7 @@ def _whole_line_of_ones_own(lines: list[bytes]) -> list[bytes]:
         (lambda lines: [*lines[:4], lines[4].replace(b'"n":5', b'"n":6'), *lines[5:]], "line 5 is missing"),
     ],
 )
-def test_each_kind_of_tampering_is_found_where_it_is(
+def test_t14_each_kind_of_tampering_is_found_where_it_is(
     path: Path, tamper: Callable[[list[bytes]], list[bytes]], says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path.write_bytes(b"".join(tamper(path.read_bytes().splitlines(keepends=True))))

@@ -104,7 +104,7 @@ def test_one_that_is_about_to_end_is_made_anew(tmp_path: Path, monkeypatch: pyte
     assert own_certificate(path, NAMES).fingerprint == new.fingerprint
 
 
-def test_a_key_that_others_may_read_isnt_used(tmp_path: Path) -> None:
+def test_t04_a_key_that_others_may_read_isnt_used(tmp_path: Path) -> None:
     path = tmp_path / "tls.pem"
     own_certificate(path, NAMES)
     path.chmod(0o640)
@@ -122,7 +122,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path, shown: Certificate, oth
         given_certificate(shown.chain, other.key)
 
 
-def test_old_versions_and_weak_suites_are_refused(shown: Certificate) -> None:
+def test_t01_old_versions_and_weak_suites_are_refused(shown: Certificate) -> None:
     with served(tls=shown.server_context()) as serving:
         assert shaken(serving.port, willing()).startswith("TLSv1.3 ")
         for version in (ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1):
@@ -176,7 +176,9 @@ def test_a_stranger_comes_in_by_tls(shown: Certificate) -> None:
             assert stranger.order(type="stop")["receipt"]["status"] == "accepted"
 
 
-def test_another_certificate_is_refused_at_once_and_after_a_restart(shown: Certificate, other: Certificate) -> None:
+def test_t01_another_certificate_is_refused_at_once_and_after_a_restart(
+    shown: Certificate, other: Certificate
+) -> None:
     with served(tls=other.server_context()) as serving:
         with pytest.raises(
             UnreachableError, match=rf"sha256={other.fingerprint}, expected sha256={shown.fingerprint}"
@@ -225,7 +227,7 @@ def test_the_console_says_in_a_line_that_a_certificate_is_another(
     assert "its certificate is another" in said
 
 
-def test_nothing_goes_off_this_machine_in_plain() -> None:
+def test_t01_nothing_goes_off_this_machine_in_plain() -> None:
     assert server_url("127.0.0.1:8600") == "ws://127.0.0.1:8600/ws"
     assert server_url("[::1]:8600") == "ws://[::1]:8600/ws"
     assert server_url("192.0.2.1:8600") == "wss://192.0.2.1:8600/ws"
@@ -284,7 +286,7 @@ def test_pages_come_by_https_alone(shown: Certificate) -> None:
             line.close()
 
 
-def test_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
+def test_t10_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
     limits = SocketLimits(strangers=3, handshake=1.0)
     with served(tls=shown.server_context(), sockets=limits) as serving:
         idle = [socket.create_connection(("127.0.0.1", serving.port), 5.0) for _ in range(4)]
@@ -323,7 +325,9 @@ def test_a_robots_health_is_told_to_sites() -> None:
     asyncio.run(main())
 
 
-def test_the_sites_know_each_other_by_certificates(shown: Certificate, other: Certificate, tmp_path: Path) -> None:
+def test_t02_the_sites_know_each_other_by_certificates(
+    shown: Certificate, other: Certificate, tmp_path: Path
+) -> None:
     site = own_certificate(tmp_path / "site.pem", (), client=True)
     stranger = own_certificate(tmp_path / "stranger.pem", (), client=True)
 
@@ -374,7 +378,7 @@ def test_a_renewed_certificate_counts_from_the_next_handshake(
         assert "No such file" in said[2]
 
 
-def test_a_site_whose_certificate_was_replaced_comes_in_no_more(tmp_path: Path, shown: Certificate) -> None:
+def test_t02_a_site_whose_certificate_was_replaced_comes_in_no_more(tmp_path: Path, shown: Certificate) -> None:
     old = own_certificate(tmp_path / "site.pem", (), client=True)
     kept = replace(old, chain=tmp_path / "old.pem", key=tmp_path / "old.pem")
     kept.chain.write_bytes(old.chain.read_bytes())

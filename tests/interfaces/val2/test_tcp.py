@@ -306,7 +306,7 @@ FOREIGN = {
 
 @pytest.mark.parametrize("size", [1, 1000])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_http_or_tls_is_hung_up_on_and_moves_nothing(tmp_path, kind, size):
+def test_t06_what_is_http_or_tls_is_hung_up_on_and_moves_nothing(tmp_path, kind, size):
     """Whatever it says next: the lines of its body, even the right token."""
 
     async def scenario():
