@@ -422,7 +422,8 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         """
         if not self.writable.is_set():
             await self.writable.wait()
-        if self.disconnected or self.close_sent:
+        # TLS may know of the end before this connection is told; it complains of each write then.
+        if self.disconnected or self.close_sent or self.transport.is_closing():
             raise ConnectionResetError
         size, first = len(data), 0x80 | opcode
         if size < 126:
