@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import psutil
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
@@ -61,6 +62,7 @@ class Ports(NamedTuple):
     token: str
     """Of the VAL-II port."""
     tls: bool
+    process: psutil.Process
 
 
 @contextlib.contextmanager
@@ -75,7 +77,7 @@ def served(directory: Path, *, tls: bool) -> Iterator[Ports]:
         try:
             lines = [process.stdout.readline() for _ in range(5 if tls else 4)]
             page = int(lines[1].rsplit(":", 1)[1].strip().rstrip("/"))
-            yield Ports(page, int(lines[-2].split()[-1]), lines[-1].split()[-1], tls)
+            yield Ports(page, int(lines[-2].split()[-1]), lines[-1].split()[-1], tls, psutil.Process(process.pid))
         finally:
             process.stdin.close()
             try:
@@ -245,16 +247,20 @@ async def _measure(ports: Ports) -> list[Result]:
         operator.halted.clear()
         async with load(kind, ports) as load_was:
             operator.took.clear()
+            before = ports.process.cpu_times()
             await asyncio.sleep(SECONDS)
+            after = ports.process.cpu_times()
             enough.set()
             await steering
             took = np.array(operator.took) * 1e3
             halted = operator.halted
             operator, back = await operator.cut_off_and_back()
         p50, p99, worst = np.quantile(took, [0.5, 0.99, 1.0]).tolist()
+        worked = (after.user + after.system - before.user - before.system) / SECONDS
         results += [
             Result(f"a command's round trip, {name}", Cost(p50, p99), "ms", Bar(p99=P99),
                    note="; ".join([f"{len(took)} commands, worst {worst:.0f} ms", *load_was])),
+            Result(f"the server's share of a processor, {name}", Cost(100.0 * worked), "%"),
             Result(f"halts, {name}", Cost(float(len(halted))), "", Bar(median=0.0), note="; ".join(halted)),
             Result(f"back after the connection was lost, {name}", Cost(back), "s", Bar(median=BACK)),
         ]  # fmt: skip

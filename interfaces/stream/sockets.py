@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 import ssl
 from asyncio.transports import BaseTransport, Transport
@@ -61,6 +62,7 @@ PARTS, PARTS_BURST = 5.0, 100.0
 messages cost, and no client's limits count them."""
 AFTERWARDS = 1000.0
 """Messages that may come after a farewell."""
+_LOG = logging.getLogger(__name__)
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
@@ -608,8 +610,12 @@ async def _end_admissions(state: ConnectionState) -> None:
     while True:
         await asyncio.sleep(PEOPLE)
         for connection, (counts, code) in list(state.admitted.items()):
-            if not counts():
-                connection.end(code, ENDED)
+            try:
+                if not counts():
+                    connection.end(code, ENDED)
+            except Exception:  # noqa: BLE001 - nobody stays because of it, and the others are looked at
+                _LOG.exception("a connection is cut off")
+                connection.abort()
 
 
 def _abort_all(connections: Iterable[object]) -> None:

@@ -19,6 +19,7 @@ from websockets.typing import Subprotocol
 
 from interfaces.cli.main import exit_status
 from interfaces.messages.control import Role
+from interfaces.stream import sockets
 from interfaces.stream.access import ENDED, Access, add_person, end_person, read_tokens
 from interfaces.stream.audit import check_audit
 from tests.interfaces import live_rig
@@ -225,3 +226,29 @@ def test_t05_a_robot_lets_a_site_go_whose_token_has_ended(tmp_path: Path) -> Non
             await live_rig.until(lambda: "this token isn't one" in operator.robot.problem)
 
     asyncio.run(main())
+
+
+def test_a_look_that_fails_ends_its_connection_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sockets, "PEOPLE", 0.0)
+    ended: list[object] = []
+
+    class Door:
+        def end(self, code: int, reason: str) -> None:
+            ended.append((code, reason))
+
+        def abort(self) -> None:
+            ended.append("aborted")
+
+    def fails() -> bool:
+        raise ZeroDivisionError
+
+    async def main() -> None:
+        state = sockets.ConnectionState(sockets.SocketLimits())
+        state.admitted = {Door(): (fails, 1008), Door(): (lambda: True, 1), Door(): (lambda: False, 4401)}  # type: ignore[dict-item]
+        looking = asyncio.create_task(sockets._end_admissions(state))
+        while len(ended) < 2:
+            await asyncio.sleep(0.001)
+        looking.cancel()
+
+    asyncio.run(main())
+    assert ended[:2] == ["aborted", (4401, ENDED)]
