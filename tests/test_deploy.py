@@ -121,14 +121,39 @@ def test_the_compose_file_is_one() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+READ_ONLY = """
+set -e
+mount --make-rprivate /
+mount --bind "$1" "$1"
+mount -o remount,ro,bind /
+cd "$1"
+shift
+exec "$@"
+"""
+"""Runs a program for which all but a directory is read-only."""
+HELD = """
+import ctypes, os, sys
+c = ctypes.CDLL(None)
+assert c.prctl(38, 1, 0, 0, 0) == 0  # PR_SET_NO_NEW_PRIVS
+c.prctl(65, 1, 0, 0, 0)  # PR_SET_MDWE, since Linux 6.3: no memory that's written becomes code
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+"""Runs a program as NoNewPrivileges and MemoryDenyWriteExecute do."""
+MOUNTS = shutil.which("unshare") is not None and not subprocess.run(
+    ["unshare", "--mount", "sh", "-ec", "mount --make-rprivate / && mount -o remount,ro,bind /"],
+    capture_output=True, check=False,
+).returncode  # fmt: skip
+
+
 @contextmanager
 def running(words: list[str], directory: Path) -> Iterator[subprocess.Popen[str]]:
-    """A command line of a file here, in a directory, with nobody's home and without new privileges."""
-    own = [str(Path(sys.executable).with_name("vrs")), *words[1:]]
-    held = ["setpriv", "--no-new-privs"] if shutil.which("setpriv") else []
-    told = os.environ | {"HOME": "/nonexistent", "MPLCONFIGDIR": str(directory), "XDG_CACHE_HOME": str(directory)}
+    """A command line of a file here, in a directory, held as it's there as far as this machine lets us."""
+    own = [sys.executable, "-c", HELD, str(Path(sys.executable).with_name("vrs")), *words[1:]]
+    read_only = ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(directory)] if MOUNTS else []
+    homeless = {"HOME": "/nonexistent", "TMPDIR": str(directory)}
+    kept = os.environ | homeless | {"MPLCONFIGDIR": str(directory), "XDG_CACHE_HOME": str(directory)}
     with subprocess.Popen(
-        [*held, *own], cwd=directory, env=told, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        [*read_only, *own], cwd=directory, env=kept, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
         start_new_session=True,
     ) as process:  # fmt: skip
         try:
@@ -138,12 +163,31 @@ def running(words: list[str], directory: Path) -> Iterator[subprocess.Popen[str]
                 os.killpg(process.pid, signal.SIGKILL)
 
 
+@pytest.mark.skipif(
+    not MOUNTS, reason="mounting isn't allowed here: command lines were run with a root that's written to"
+)
+def test_all_but_its_directory_is_read_only_for_what_is_run(tmp_path: Path) -> None:
+    there = tmp_path.parent / f"beside {tmp_path.name}"
+    tried = ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(tmp_path), "touch", "here", str(there)]
+    assert subprocess.run(tried, capture_output=True, check=False).returncode
+    assert [path.name for path in tmp_path.iterdir()] == ["here"]
+    assert not there.exists()
+
+
 def free_port() -> str:
     with socket.create_server(("127.0.0.1", 0)) as listening:
         return str(listening.getsockname()[1])
 
 
-@pytest.mark.parametrize("name", [*UNITS, *SERVICES])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "vrs-serve.service",
+        "robot",
+        pytest.param("vrs-robot.service", marks=pytest.mark.slow),
+        pytest.param("serve", marks=pytest.mark.slow),
+    ],
+)
 def test_t19_what_is_run_is_well_and_ends_when_told(name: str, tmp_path: Path) -> None:
     port, old = free_port(), "8601" if "robot" in name else "8600"
 
