@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import configparser
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -146,16 +147,15 @@ MOUNTS = shutil.which("unshare") is not None and not subprocess.run(
 
 
 @contextmanager
-def running(words: list[str], directory: Path) -> Iterator[subprocess.Popen[str]]:
+def running(words: list[str], directory: Path, before: Sequence[str] = ()) -> Iterator[subprocess.Popen[bytes]]:
     """A command line of a file here, in a directory, held as it's there as far as this machine lets us."""
     own = [sys.executable, "-c", HELD, str(Path(sys.executable).with_name("vrs")), *words[1:]]
     read_only = ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(directory)] if MOUNTS else []
     homeless = {"HOME": "/nonexistent", "TMPDIR": str(directory)}
     kept = os.environ | homeless | {"MPLCONFIGDIR": str(directory), "XDG_CACHE_HOME": str(directory)}
-    with subprocess.Popen(
-        [*read_only, *own], cwd=directory, env=kept, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-        start_new_session=True,
-    ) as process:  # fmt: skip
+    lines = [*read_only, *before, *own]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(lines, cwd=directory, env=kept, **quiet, start_new_session=True) as process:
         try:
             yield process
         finally:
@@ -179,6 +179,26 @@ def free_port() -> str:
         return str(listening.getsockname()[1])
 
 
+def run_till_it_is_well(name: str, directory: Path, before: Sequence[str] = ()) -> None:
+    """Run what a file here runs, until the compose file's health check finds it well, and end it."""
+    port, old = free_port(), "8601" if "robot" in name else "8600"
+
+    def here(word: str) -> str:
+        return word.replace(old, port).replace("/data", str(directory)).replace("0.0.0.0", "127.0.0.1")
+
+    healthy = service("robot" if "robot" in name else "serve")["healthcheck"]["test"]
+    assert healthy[:2] == ["CMD", "python"]
+    looks = [sys.executable, *map(here, healthy[2:])]
+    with running([*map(here, command(name)), "--tls"], directory, before) as process:
+        end = time.monotonic() + 90.0
+        while subprocess.run(looks, capture_output=True, check=False, cwd=directory).returncode:
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.2)
+        os.killpg(process.pid, signal.SIGTERM)
+        assert process.wait(30.0) == 0
+
+
 @pytest.mark.parametrize(
     "name",
     [
@@ -189,22 +209,34 @@ def free_port() -> str:
     ],
 )
 def test_t19_what_is_run_is_well_and_ends_when_told(name: str, tmp_path: Path) -> None:
-    port, old = free_port(), "8601" if "robot" in name else "8600"
-
-    def here(word: str) -> str:
-        return word.replace(old, port).replace("/data", str(tmp_path)).replace("0.0.0.0", "127.0.0.1")
-
-    healthy = service("robot" if "robot" in name else "serve")["healthcheck"]["test"]
-    assert healthy[:2] == ["CMD", "python"]
-    looks = [sys.executable, *map(here, healthy[2:])]
-    with running([*map(here, command(name)), "--tls"], tmp_path) as process:
-        end = time.monotonic() + 60.0
-        while subprocess.run(looks, capture_output=True, check=False, cwd=tmp_path).returncode:
-            assert process.poll() is None
-            assert time.monotonic() < end
-            time.sleep(0.2)
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(20.0) == 0
+    run_till_it_is_well(name, tmp_path)
     made = {path.name: path.stat().st_mode & 0o777 for path in tmp_path.iterdir() if path.is_file()}
     assert {"tokens", "tokens.tls.pem", "audit.jsonl"} <= set(made)
     assert {made[one] for one in ("tokens", "tokens.tls.pem", "audit.jsonl")} == {0o600}
+
+
+def system_calls(group: str) -> set[str]:
+    """What a group of system calls holds, as systemd has it."""
+    words = [line.strip() for line in analyzed("syscall-filter", group).stdout.splitlines()[1:]]
+    found: set[str] = set()
+    for word in words:
+        found |= (
+            system_calls(word) if word.startswith("@") else {word} - {""} if not word.startswith("#") else set()
+        )
+    return found
+
+
+@pytest.mark.slow
+@needs_systemd
+@pytest.mark.skipif(shutil.which("strace") is None, reason="strace isn't here: system calls weren't compared")
+@pytest.mark.parametrize("name", UNITS)
+def test_no_system_call_is_made_that_a_unit_forbids(name: str, tmp_path: Path) -> None:
+    groups = unit(name)["SystemCallFilter"]
+    allowed = system_calls(groups[0])
+    for group in groups[1:]:
+        allowed -= system_calls(group.removeprefix("~"))
+    traced = tmp_path / "traced"
+    run_till_it_is_well(name, tmp_path, ["strace", "-f", "-qq", "-o", str(traced)])
+    made = set(re.findall(r"(?m)^\d+ +([a-z_0-9]+)\(", traced.read_text(errors="replace")))
+    assert len(made) > 50
+    assert made - allowed == set()
