@@ -523,7 +523,7 @@ async def serve(
     # Signals are left to whoever runs it.
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
-    looking = [asyncio.create_task(look(state)) for look in (_cut_off_overdue, _end_admissions)]
+    looking = [asyncio.create_task(look(state)) for look in (_cut_off_overdue, end_admissions)]
     task = asyncio.create_task(server.serve(sockets=[listening] if tls is None else []))
     try:
         while not server.started and not task.done():
@@ -606,7 +606,8 @@ async def _cut_off_overdue(state: ConnectionState) -> None:
             await asyncio.sleep(0)
 
 
-async def _end_admissions(state: ConnectionState) -> None:
+async def end_admissions(state: ConnectionState) -> None:
+    """Close WebSockets of a server whose tokens have ended, until it's cancelled."""
     while True:
         await asyncio.sleep(PEOPLE)
         for connection, (counts, code) in list(state.admitted.items()):

@@ -245,7 +245,7 @@ def test_a_look_that_fails_ends_its_connection_and_no_other(monkeypatch: pytest.
     async def main() -> None:
         state = sockets.ConnectionState(sockets.SocketLimits())
         state.admitted = {Door(): (fails, 1008), Door(): (lambda: True, 1), Door(): (lambda: False, 4401)}  # type: ignore[dict-item]
-        looking = asyncio.create_task(sockets._end_admissions(state))
+        looking = asyncio.create_task(sockets.end_admissions(state))
         while len(ended) < 2:
             await asyncio.sleep(0.001)
         looking.cancel()
