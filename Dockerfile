@@ -3,11 +3,12 @@ FROM python:3.11-slim-bookworm
 
 RUN useradd --create-home --uid 1000 vrs && mkdir /data && chown vrs:vrs /data
 WORKDIR /opt/vrs-teleop
-COPY pyproject.toml constraints.txt README.md LICENSE LICENSE-APACHE-2.0 THIRD_PARTY.md ./
+COPY pyproject.toml constraints.txt hashes.txt README.md LICENSE LICENSE-APACHE-2.0 THIRD_PARTY.md ./
 COPY vrs vrs
 COPY robots robots
 COPY interfaces interfaces
-RUN pip install --no-cache-dir -c constraints.txt .
+COPY .ci/install.py .ci/
+RUN PIP_NO_CACHE_DIR=1 python .ci/install.py .
 
 COPY examples /data/examples
 USER vrs

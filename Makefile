@@ -7,9 +7,10 @@ BENCH_STAMP := .venv/.installed-bench
 # Each of the suite's hundreds of processes would compile three hundred modules where the environment keeps Python
 # from storing what it compiled.
 export PYTHONDONTWRITEBYTECODE :=
-PIP := $(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# Everything by its hash; see there.
+INSTALL := $(PY) .ci/install.py -e .
 
-.PHONY: demo test slow without contract platforms generate lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test slow without contract platforms hashes generate lint types docs docs-check bench reproduce soak wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -61,10 +62,15 @@ reproduce: $(STAMP)
 docs: $(DOCS_STAMP)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --strict
 
-# Whether all that the base install needs has wheels for each machine and Python that README names.
+# Whether all that is needed, with extras, has wheels and hashes for each machine and Python that README names.
 platforms: $(DEV_STAMP)
-	$(PIP) -e '.[platforms]'
+	$(INSTALL) platforms
 	$(PY) .ci/platforms.py
+
+# The hashes of all that constraints.txt names, for whatever machine: after a change there.
+hashes: $(DEV_STAMP)
+	$(INSTALL) platforms
+	$(PY) -m uv pip compile --quiet --universal --no-deps --no-header --no-annotate --generate-hashes constraints.txt -o hashes.txt
 
 # Every command of README and docs that takes too long for `make test`.
 docs-check: $(DEV_STAMP)
@@ -73,20 +79,20 @@ docs-check: $(DEV_STAMP)
 $(PY):
 	@sh .ci/venv
 
-$(STAMP): pyproject.toml constraints.txt | $(PY)
-	$(PIP) -e .
+$(STAMP): pyproject.toml constraints.txt hashes.txt .ci/install.py | $(PY)
+	$(INSTALL)
 	@touch $@
 
 $(DEV_STAMP): $(STAMP)
-	$(PIP) -e '.[dev]'
+	$(INSTALL) dev
 	@touch $@
 
 $(DOCS_STAMP): $(STAMP)
-	$(PIP) -e '.[docs]'
+	$(INSTALL) docs
 	@touch $@
 
 $(BENCH_STAMP): $(STAMP)
-	$(PIP) -e '.[bench]'
+	$(INSTALL) bench
 	@touch $@
 
 # A million random edits of every kind, each held to every law; VRS_SOAK_EDITS and VRS_SOAK_SEED change what is drawn.
@@ -97,7 +103,7 @@ soak: $(DEV_STAMP)
 	$(PY) -m pytest tests/vrs/test_machine.py
 	VRS_SOAK_PACKETS=100000 VRS_SOAK_DATAGRAMS=500000 $(PY) -m pytest tests/interfaces/rsp/test_exchange.py tests/interfaces/rsp/test_fuzz.py
 
-# The wheel, in an empty environment outside the checkout, does the main job.
+# The wheel, in an empty environment outside the checkout, does the main job; what that is made of: out/sbom.json.
 wheel: $(DEV_STAMP)
 	@sh .ci/wheel
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -19,11 +20,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import psutil
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Subprotocol
 
-from benchmarks.loads import LOADED
+from benchmarks.loads import LOADED, unverified
 from benchmarks.results import Bar, Cost, Part, Result
 
 SECONDS = 8.0
@@ -44,6 +46,12 @@ SCENARIOS = {
     "4,000 connections a second": "connections",
     "a flooded VAL-II port": "terminals",
 }
+BY_TLS = {
+    "alone by TLS": "",
+    "30 viewers at all they may send, by TLS": "viewers",
+    "a flood of handshakes of TLS": "handshakes",
+}
+"""The same with a server that speaks TLS."""
 
 
 class Ports(NamedTuple):
@@ -53,21 +61,23 @@ class Ports(NamedTuple):
     val: int
     token: str
     """Of the VAL-II port."""
+    tls: bool
+    process: psutil.Process
 
 
 @contextlib.contextmanager
-def served(directory: Path) -> Iterator[Ports]:
+def served(directory: Path, *, tls: bool) -> Iterator[Ports]:
     """`vrs serve` with a robot of its own."""
     command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--val-port", "0",
-               "--val-files", str(directory), "--until-eof"]  # fmt: skip
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as process:
+               "--val-files", str(directory), "--until-eof", "--tls" if tls else "--no-tls"]  # fmt: skip
+    pipe, kept = subprocess.PIPE, os.environ | {"XDG_STATE_HOME": str(directory)}
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=kept) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         try:
-            lines = [process.stdout.readline() for _ in range(4)]
+            lines = [process.stdout.readline() for _ in range(5 if tls else 4)]
             page = int(lines[1].rsplit(":", 1)[1].strip().rstrip("/"))
-            yield Ports(page, int(lines[2].split()[-1]), lines[3].split()[-1])
+            yield Ports(page, int(lines[-2].split()[-1]), lines[-1].split()[-1], tls, psutil.Process(process.pid))
         finally:
             process.stdin.close()
             try:
@@ -85,6 +95,7 @@ async def load(kind: str, ports: Ports) -> AsyncIterator[list[str]]:
         return
     port = ports.val if kind == "terminals" else ports.page
     command = [sys.executable, str(LOADS), kind, str(port), str(SECONDS + BACK + 8.0), ports.token]
+    command += ["tls"] if ports.tls else []
     pipe = subprocess.PIPE
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     try:
@@ -105,7 +116,7 @@ async def load(kind: str, ports: Ports) -> AsyncIterator[list[str]]:
 class Operator:
     """Steers by a plain WebSocket, and notes when its commands are answered."""
 
-    port: int
+    ports: Ports
     peer: ClientConnection
     session: str = ""
     epoch: str = ""
@@ -120,11 +131,14 @@ class Operator:
     """Round trips of commands [s]."""
 
     @classmethod
-    async def join(cls, port: int, session: str = "", *, wait: float = 30.0) -> Operator:
+    async def join(cls, ports: Ports, session: str = "", *, wait: float = 30.0) -> Operator:
         """Connect within a time [s], perhaps to go on with a session, until the server has said welcome."""
-        url, protocol = f"ws://127.0.0.1:{port}/ws", Subprotocol("vrs.1.json")
-        peer = await connect(url, subprotocols=[protocol], compression=None, proxy=None, open_timeout=wait)
-        self = cls(port, peer)
+        url, protocol = f"{'wss' if ports.tls else 'ws'}://127.0.0.1:{ports.page}/ws", Subprotocol("vrs.1.json")
+        context = unverified() if ports.tls else None
+        peer = await connect(
+            url, subprotocols=[protocol], compression=None, proxy=None, open_timeout=wait, ssl=context
+        )
+        self = cls(ports, peer)
         hello = {"type": "hello", "protocol": 1, "role": "operator", "name": "Ada"}
         await self.send(hello | ({"session": session} if session else {}))
         welcome = await self.until("welcome", wait)
@@ -211,7 +225,7 @@ class Operator:
         begun = time.monotonic()
         while time.monotonic() < begun + 4 * BACK:
             try:
-                other = await Operator.join(self.port, self.session, wait=1.0)
+                other = await Operator.join(self.ports, self.session, wait=1.0)
                 other.epoch, other.number, other.state = self.epoch, self.number, self.state
                 await other.command(settled=False)
                 await other.until("outcome")
@@ -219,13 +233,13 @@ class Operator:
                 await asyncio.sleep(0.05)
             else:
                 return other, time.monotonic() - begun
-        return await Operator.join(self.port), time.monotonic() - begun
+        return await Operator.join(self.ports), time.monotonic() - begun
 
 
 async def _measure(ports: Ports) -> list[Result]:
     results: list[Result] = []
-    for name, kind in SCENARIOS.items():
-        operator = await Operator.join(ports.page)
+    for name, kind in (BY_TLS if ports.tls else SCENARIOS).items():
+        operator = await Operator.join(ports)
         await operator.ready()
         enough = asyncio.Event()
         steering = asyncio.create_task(operator.steer(enough))
@@ -233,16 +247,20 @@ async def _measure(ports: Ports) -> list[Result]:
         operator.halted.clear()
         async with load(kind, ports) as load_was:
             operator.took.clear()
+            before = ports.process.cpu_times()
             await asyncio.sleep(SECONDS)
+            after = ports.process.cpu_times()
             enough.set()
             await steering
             took = np.array(operator.took) * 1e3
             halted = operator.halted
             operator, back = await operator.cut_off_and_back()
         p50, p99, worst = np.quantile(took, [0.5, 0.99, 1.0]).tolist()
+        worked = (after.user + after.system - before.user - before.system) / SECONDS
         results += [
             Result(f"a command's round trip, {name}", Cost(p50, p99), "ms", Bar(p99=P99),
                    note="; ".join([f"{len(took)} commands, worst {worst:.0f} ms", *load_was])),
+            Result(f"the server's share of a processor, {name}", Cost(100.0 * worked), "%"),
             Result(f"halts, {name}", Cost(float(len(halted))), "", Bar(median=0.0), note="; ".join(halted)),
             Result(f"back after the connection was lost, {name}", Cost(back), "s", Bar(median=BACK)),
         ]  # fmt: skip
@@ -260,8 +278,10 @@ def part() -> Part:
         (directory / LOADED).write_text(
             ".PROGRAM flood()\n" + "  x = x + 1\n" * 80_000 + ".END\n", encoding="ascii"
         )
-        with served(directory) as ports:
-            results = asyncio.run(_measure(ports))
+        results: list[Result] = []
+        for tls in (False, True):
+            with served(directory, tls=tls) as ports:
+                results += asyncio.run(_measure(ports))
     return Part(
         "Availability",
         f"`vrs serve` and its robot, and an operator who steers every {1000 * PERIOD:g} ms for {SECONDS:g} s by a "
@@ -269,7 +289,8 @@ def part() -> Part:
         "own on the same machine, one after the other: viewers at nine tenths of the messages they may send, most "
         "of them for edits; sockets that say nothing, half a request or no hello, opened again where they were "
         "closed; connections that come and go; a terminal that sends lines and loads a program of a megabyte as "
-        "fast as it's let, beside others without a token. Under each the operator's connection is lost, and comes "
-        "back with its session.",
+        "fast as it's let, beside others without a token; and with a server that speaks TLS, where the flood is of "
+        "handshakes that a client begins by a first message made once, and leaves: the dear part is the server's. "
+        "Under each the operator's connection is lost, and comes back with its session.",
         tuple(results),
     )

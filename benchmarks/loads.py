@@ -1,7 +1,7 @@
 """Loads on a server of this machine, each a process of its own, bounded in number and time.
 
-`python benchmarks/loads.py KIND PORT SECONDS [TOKEN]` says `on` when it's on, ends with its time or its input, and
-says then how much it was.
+`python benchmarks/loads.py KIND PORT SECONDS TOKEN [tls]` says `on` when it's on, ends with its time or its input,
+and says then how much it was.
 It knows the server from docs/protocol.md and docs/console.md alone.
 """
 
@@ -14,6 +14,7 @@ import json
 import os
 import select
 import socket
+import ssl
 import struct
 import sys
 import time
@@ -33,6 +34,8 @@ REOPENED = 500
 """Sockets a second that are opened again where the server closed them."""
 CONNECTIONS = 4000
 """Connections a second that come and go."""
+HANDSHAKES = 1000
+"""Handshakes of TLS a second that are begun."""
 LINGERING = 64
 """So many of them are open at once."""
 TERMINALS = 64
@@ -52,10 +55,17 @@ def on() -> None:
     print("on", flush=True)
 
 
-async def _view(port: int, sent: list[int], viewer: int) -> None:
+def unverified() -> ssl.SSLContext:
+    """TLS to whoever is on this machine."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context
+
+
+async def _view(port: int, sent: list[int], viewer: int, tls: ssl.SSLContext | None) -> None:
     """One viewer, and how many messages it has sent."""
-    begun = time.monotonic()
-    async with connect(f"ws://{HERE}:{port}/ws", subprotocols=[Subprotocol("vrs.1.json")], proxy=None) as peer:
+    begun, url = time.monotonic(), f"{'ws' if tls is None else 'wss'}://{HERE}:{port}/ws"
+    async with connect(url, subprotocols=[Subprotocol("vrs.1.json")], proxy=None, ssl=tls) as peer:
         await peer.send('{"type":"hello","protocol":1,"role":"viewer","name":"load"}')
         await peer.send('{"type":"follow","number":1,"form":"segments"}')
         reading = asyncio.create_task(_drop(peer))
@@ -83,11 +93,11 @@ async def _drop(peer: ClientConnection) -> None:
             pass
 
 
-async def view(port: int, seconds: float) -> None:
+async def view(port: int, seconds: float, tls: ssl.SSLContext | None) -> None:
     """Viewers at all that they may send."""
     until = time.monotonic() + seconds
     sent = VIEWERS * [0]
-    tasks = [asyncio.create_task(_view(port, sent, viewer)) for viewer in range(VIEWERS)]
+    tasks = [asyncio.create_task(_view(port, sent, viewer, tls)) for viewer in range(VIEWERS)]
     await asyncio.sleep(1.0)
     on()
     begun, before = time.monotonic(), sum(sent)
@@ -144,17 +154,29 @@ def idle(port: int, seconds: float) -> None:
     print(f"{opened} opened again", flush=True)
 
 
-def come_and_go(port: int, seconds: float) -> None:
-    """Connections that come, say nothing or half of something, and go; nobody waits for the server."""
+def first_message() -> bytes:
+    """What begins a handshake; each may begin by the same."""
+    out = ssl.MemoryBIO()
+    with contextlib.suppress(ssl.SSLWantReadError):
+        unverified().wrap_bio(ssl.MemoryBIO(), out, server_hostname=HERE).do_handshake()
+    return out.read()
+
+
+def come_and_go(port: int, seconds: float, rate: int, says: tuple[bytes, bytes], stay: int = 0) -> None:
+    """Connections that come, say something in turn, stay till so many others have said it, and go.
+
+    Nobody waits for the server.
+    """
     begun, made, answered = time.monotonic(), 0, 0
     on()
     # Closed by a reset: what was closed otherwise keeps its port for a minute.
     linger = struct.pack("ii", 1, 0)
     under_way: deque[socket.socket] = deque()
+    said: deque[socket.socket] = deque()
     while (passed := time.monotonic() - begun) < seconds:
         if made % 256 == 0 and ended():
             break
-        if made >= CONNECTIONS * passed:
+        if made >= rate * passed:
             time.sleep(0.002)
             continue
         peer = socket.socket()
@@ -164,10 +186,13 @@ def come_and_go(port: int, seconds: float) -> None:
         under_way.append(peer)
         made += 1
         if len(under_way) > LINGERING:
-            with under_way.popleft() as oldest, contextlib.suppress(OSError):
-                oldest.send(b"GET / HTTP/1.1\r\nHost" if made % 2 else b"G")
+            said.append(under_way.popleft())
+            with contextlib.suppress(OSError):
+                said[-1].send(says[made % 2])
                 answered += 1
-    for peer in under_way:
+        while len(said) > stay:
+            said.popleft().close()
+    for peer in (*under_way, *said):
         peer.close()
     passed = time.monotonic() - begun
     print(f"{made / passed:.0f} connections a second, {answered / passed:.0f} of them made", flush=True)
@@ -202,10 +227,12 @@ def type_on(port: int, seconds: float, token: str) -> None:
 def main(words: list[str]) -> None:
     """Be one load."""
     kind, port, seconds = words[0], int(words[1]), float(words[2])
+    tls = unverified() if words[4:] else None
     loads: dict[str, Callable[[], None]] = {
-        "viewers": lambda: asyncio.run(view(port, seconds)),
+        "viewers": lambda: asyncio.run(view(port, seconds, tls)),
         "idle": lambda: idle(port, seconds),
-        "connections": lambda: come_and_go(port, seconds),
+        "connections": lambda: come_and_go(port, seconds, CONNECTIONS, (b"G", b"GET / HTTP/1.1\r\nHost")),
+        "handshakes": lambda: come_and_go(port, seconds, HANDSHAKES, 2 * (first_message(),), LINGERING),
         "terminals": lambda: type_on(port, seconds, words[3]),
     }
     loads[kind]()

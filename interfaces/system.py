@@ -6,6 +6,7 @@ What only some systems have is asked for here alone, and done without where it i
 from __future__ import annotations
 
 import contextlib
+import errno
 import inspect
 import ipaddress
 import os
@@ -207,6 +208,24 @@ def _callables(namespace: dict[str, Any], where: str) -> list[str]:
         for name, value in namespace.items()
         if callable(value) and not name.startswith("_") and getattr(value, "__module__", "") == where
     ]
+
+
+def lock(file: int) -> bool:
+    """Keep a file to oneself as long as it's open; whether nobody else does. Not every system can tell.
+
+    Args:
+        file: Its descriptor.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        # Some network's file systems have no locks.
+        return error.errno not in {errno.EACCES, errno.EAGAIN}
+    return True
 
 
 NICE = -10

@@ -23,6 +23,7 @@ from vrs.errors import FormatError, InvalidValueError
 if TYPE_CHECKING:
     import asyncio
     from contextlib import AsyncExitStack
+    from ssl import SSLContext
 
     from rich.progress import Progress
 
@@ -449,6 +450,20 @@ def say_certificate(certificate: Certificate | None) -> None:
     if certificate is not None:
         new = "made just now: tell its clients, " if certificate.renewed else ""
         typer.echo(f"vrs: certificate {certificate.chain}, {new}SHA-256 {certificate.shown}")
+
+
+def tls_of(certificate: Certificate | None, clients: Path | None = None) -> Callable[[], SSLContext] | None:
+    """What a server's handshakes are done by; another certificate in its files is said on standard error.
+
+    Args:
+        certificate: The server's; None without TLS.
+        clients: Certificates of those who may come in at all; None for everybody.
+    """
+    if certificate is None:
+        return None
+    from interfaces.stream.certificates import ServerTls
+
+    return ServerTls(certificate, clients, say=lambda said: typer.echo(f"vrs: {said}", err=True)).context
 
 
 def schemes(certificate: Certificate | None) -> tuple[str, str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -29,6 +30,7 @@ from interfaces.cli.options import (
     say_certificate,
     schemes,
     shown_host,
+    tls_of,
 )
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError
@@ -207,7 +209,7 @@ def _serve(
     from interfaces.messages.control import Role
     from interfaces.station.replay_page import ReplayPage
     from interfaces.stream import sockets
-    from interfaces.stream.server import application
+    from interfaces.stream.server import admit, application
     from vrs.clock import WallClock
 
     async def served() -> None:
@@ -221,14 +223,11 @@ def _serve(
 
         if start.at is not None:
             playback.seek(start.at, now=clock.now())
-        page = ReplayPage(
-            playback, clock, authorize=lambda token: not access.refusal(Role.VIEWER, token), first=first
-        )
+        page = ReplayPage(playback, clock, authorize=partial(admit, access, Role.VIEWER), first=first)
         number = listening.getsockname()[1]
         app = application(page.routes, allowed(number))
-        context = None if certificate is None else certificate.server_context()
         scheme, _, _ = schemes(certificate)
-        async with sockets.serve(app, listening, tls=context), page.running():
+        async with sockets.serve(app, listening, tls=tls_of(certificate)), page.running():
             names = " and ".join(str(track.recording.path) for track in playback.tracks)
             typer.echo(f"vrs: playing {names} on {scheme}://{Address(shown_host(host), number)}/replay")
             say_certificate(certificate)

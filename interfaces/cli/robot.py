@@ -47,6 +47,7 @@ from interfaces.cli.options import (
     schemes,
     shown_host,
     site_certificate,
+    tls_of,
     tokens_for,
 )
 from interfaces.system import run_loop, software
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from interfaces.rsp.model import RobotModel
     from interfaces.rsp.session import Keyring
     from interfaces.runtime.live.robot import LiveBody, LiveRobot
+    from interfaces.stream.audit import AuditLog
     from interfaces.stream.certificates import Certificate
     from robots.rooms import Room
 
@@ -279,9 +281,10 @@ def robot(
     async def main() -> str:
         says = f"{made.name}, {kind}", remark
         robot = LiveRobot(made, access, server=software(), audit=log)
-        return await _serve(robot, says, door, until_eof=until_eof)
+        return await _serve(robot, says, door, log, until_eof=until_eof)
 
     with audit_log(audit) as log:
+        access.audit = log
         problem = run_loop(main())
     _end(problem)
 
@@ -319,7 +322,9 @@ class _Door(NamedTuple):
             return None
 
 
-async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_eof: bool) -> str:
+async def _serve(
+    robot: LiveRobot, says: tuple[str, str], door: _Door, log: AuditLog | None, *, until_eof: bool
+) -> str:
     """Run until a signal comes, the body fails, or standard input ends; what failed, if anything did."""
     from interfaces.link.proxy import Address
     from interfaces.runtime.live.process import READY
@@ -333,11 +338,10 @@ async def _serve(robot: LiveRobot, says: tuple[str, str], door: _Door, *, until_
     address, certificate, theirs = door.address, door.certificate, door.theirs
     listening = sockets.bind(address.host, address.port)
     port = listening.getsockname()[1]
-    app = application(robot.routes, door.allowed(port))
+    app = application(robot.routes, door.allowed(port), audit=log)
     kind, remark = says
-    context = None if certificate is None else certificate.server_context(None if theirs is None else theirs.chain)
-    datagrams = door.bound(port)
-    async with sockets.serve(app, listening, largest=LARGEST, tls=context), robot.running(datagrams):
+    tls, datagrams = tls_of(certificate, None if theirs is None else theirs.chain), door.bound(port)
+    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running(datagrams):
         await robot.ready()
         keep_quiet()
         hasten(1)

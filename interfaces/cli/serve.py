@@ -56,6 +56,7 @@ from interfaces.cli.options import (
     site_certificate,
     speaks_val,
     start_robot,
+    tls_of,
     untaken,
 )
 from interfaces.system import run_loop, software
@@ -282,6 +283,7 @@ def serve(
         ))  # fmt: skip
     taught = _Class(reached_as[0] if reached_as else "", teacher) if class_ else None
     with audit_log(audit) as log:
+        access.audit = log
         run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, until_eof=until_eof))
 
 
@@ -478,10 +480,9 @@ async def _serve(
             else:
                 first = routes
         page, ws, known = schemes(certificate)
-        context = None if certificate is None else certificate.server_context()
         joining = None if taught is None else taught.pages(access, clock, shown, page)
-        app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port))
-        for part in (sockets.serve(app, listening, tls=context), *parts):
+        app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port), audit=log)
+        for part in (sockets.serve(app, listening, tls=tls_of(certificate)), *parts):
             await stack.enter_async_context(part)
         keep_quiet()
         tidying = asyncio.create_task(

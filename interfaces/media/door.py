@@ -28,7 +28,7 @@ from interfaces.media.camera import CameraError
 from interfaces.media.live import LiveMedia, MediaChoice
 from interfaces.media.messages import CameraView
 from interfaces.messages.control import Role
-from interfaces.stream.access import Access, bearer
+from interfaces.stream.access import Access
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.page import (
     PATIENCE,
@@ -39,7 +39,7 @@ from interfaces.stream.meshcat.page import (
     same_origin,
     token_in,
 )
-from interfaces.stream.server import HEADERS
+from interfaces.stream.server import HEADERS, admit, refusal
 from interfaces.stream.sockets import let_stay
 from vrs.checks import one_of
 from vrs.errors import InvalidValueError, VrsError
@@ -100,12 +100,13 @@ class MediaDoor:
         try:
             await websocket.accept()
             said = await first_text(websocket)
-            if self._access.refusal(Role.VIEWER, token_in(said)):
+            admission = admit(self._access, Role.VIEWER, websocket, token_in(said))
+            if admission.refusal:
                 await websocket.close(UNAUTHORISED, "a token that is valid here, please")
             elif len(self._pages) >= MOST_PAGES:
                 await websocket.close(TRY_AGAIN_LATER, "too many pages")
             else:
-                let_stay(websocket.scope, known=bool(said))
+                let_stay(websocket.scope, known=bool(said), counts=admission.counts, code=UNAUTHORISED)
                 await self._attend(_Page(websocket, self._media))
         except WebSocketDisconnect:
             return
@@ -120,8 +121,8 @@ class MediaDoor:
 
     async def _still(self, request: Request) -> Response:
         """A picture by itself."""
-        if refusal := self._access.refusal(Role.VIEWER, bearer(request.headers.get("authorization", ""))):
-            return JSONResponse({"problem": refusal}, 403, HEADERS)
+        if refused := refusal(request, self._access, Role.VIEWER):
+            return JSONResponse({"problem": refused}, 403, HEADERS)
         if not self._stills.take(self._media.clock.now()):
             return JSONResponse({"problem": "too many pictures: try again in a moment"}, 429, HEADERS)
         try:

@@ -218,7 +218,7 @@ class ProblemCode(enum.StrEnum):
     VERSION = "version"
     """No common version of the protocol."""
     REFUSED = "refused"
-    """The token isn't right for the role, or the code isn't one that counts."""
+    """The token isn't right for the role, or has ended, which may come later, or the code isn't one that counts."""
     FULL = "full"
     """Too many clients."""
     LEASE = "lease"

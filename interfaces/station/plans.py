@@ -15,9 +15,9 @@ from interfaces.messages.control import Role
 from interfaces.messages.fields import plain
 from interfaces.runtime.plan import MAX_BYTES, parse_plan, written_plan
 from interfaces.station.record import BURST, RATE, body, said
-from interfaces.stream.access import Access, bearer
+from interfaces.stream.access import Access
 from interfaces.stream.limits import Bucket
-from interfaces.stream.server import HEADERS
+from interfaces.stream.server import HEADERS, refusal
 from vrs.clock import Clock
 from vrs.errors import FormatError, VrsError
 
@@ -50,9 +50,8 @@ class Plans:
     async def _answer(self, request: Request) -> Response:
         reads = request.method == "POST"
         try:
-            role = Role.OPERATOR if reads else Role.VIEWER
-            if refusal := self._access.refusal(role, bearer(request.headers.get("authorization", ""))):
-                return said(403, refusal)
+            if refused := refusal(request, self._access, Role.OPERATOR if reads else Role.VIEWER):
+                return said(403, refused)
             if not self._asked.take(self._clock.now()):
                 return said(429, "too many requests: try again in a moment")
             if not reads:

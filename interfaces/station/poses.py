@@ -15,9 +15,9 @@ from starlette.routing import BaseRoute, Route
 
 from interfaces.messages.control import Role
 from interfaces.station.record import BURST, RATE, body, said
-from interfaces.stream.access import Access, bearer
+from interfaces.stream.access import Access
 from interfaces.stream.limits import Bucket
-from interfaces.stream.server import HEADERS
+from interfaces.stream.server import HEADERS, refusal
 from interfaces.system import read_within, write_whole, written
 from vrs.checks import finite_array
 from vrs.clock import Clock
@@ -76,9 +76,8 @@ class Poses:
     async def _answer(self, request: Request) -> Response:
         changes = request.method == "POST"
         try:
-            token = bearer(request.headers.get("authorization", ""))
-            if refusal := self._access.refusal(Role.OPERATOR if changes else Role.VIEWER, token):
-                return said(403, refusal)
+            if refused := refusal(request, self._access, Role.OPERATOR if changes else Role.VIEWER):
+                return said(403, refused)
             if changes:
                 if not self._asked.take(self._clock.now()):
                     return said(429, "too many requests: try again in a moment")

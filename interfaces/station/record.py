@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import secrets
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from urllib.parse import quote
 
 import msgspec
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
@@ -25,7 +28,8 @@ from interfaces.stream.access import Access, bearer
 from interfaces.stream.limits import Bucket
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.meshcat.page import Viewers
-from interfaces.stream.server import HEADERS
+from interfaces.stream.server import HEADERS, admit, refusal
+from interfaces.system import PLAIN_READ
 from vrs.clock import Clock
 from vrs.errors import InvalidValueError, VrsError
 
@@ -45,6 +49,8 @@ TICKET: Final = 30.0
 """How long a download may be begun [s]."""
 SENT_AT_ONCE: Final = 4
 """Downloads at once."""
+_CHUNK: Final = 65536
+"""Bytes of a download that are read at once."""
 
 
 class _RecordAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,6 +58,18 @@ class _RecordAsk(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     do: str
     name: str = ""
+
+
+class _Ticket(NamedTuple):
+    """What a download may be begun by."""
+
+    path: Path
+    file: tuple[int, int]
+    """Device and number of the file that was meant: another one in its place isn't sent."""
+    until: float
+    """[s]"""
+    counts: Callable[[], bool]
+    """Whether the token that it was given for counts still."""
 
 
 class Recordings:
@@ -76,16 +94,13 @@ class Recordings:
         """
         self._recording, self._clock, self._shelf, self._access = recording, clock, shelf, access
         self._what = what
-
-        def allowed(token: str | None) -> bool:
-            return not access.refusal(Role.VIEWER, token)
-
+        allowed = partial(admit, access, Role.VIEWER)
         self.replays = Replays(shelf, clock, allowed)
         self._board = Newest(b'{"kind":"begin"}')
         self._viewers = Viewers(self._board, allowed)
         self._looking = asyncio.Event()
         self._asked = {role: Bucket(RATE, BURST, clock.now()) for role in Role}
-        self._tickets: OrderedDict[str, tuple[Path, float]] = OrderedDict()
+        self._tickets: OrderedDict[str, _Ticket] = OrderedDict()
         self.sent = 0
         """Downloads under way."""
 
@@ -155,17 +170,17 @@ class Recordings:
 
     async def _answer(self, request: Request) -> Response:
         """Do what a page asks for."""
-        shown = bearer(request.headers.get("authorization", ""))
         try:
-            if refusal := self._access.refusal(Role.VIEWER, shown):
-                return said(403, refusal)
+            if refused := refusal(request, self._access, Role.VIEWER):
+                return said(403, refused)
             ask = msgspec.json.decode(await body(request, LARGEST), type=_RecordAsk)
             role = Role.VIEWER if ask.do == "copy" else Role.OPERATOR
-            if refusal := self._access.refusal(role, shown):
-                return said(403, refusal)
+            admission = admit(self._access, role, request, bearer(request.headers.get("authorization", "")))
+            if admission.refusal:
+                return said(403, admission.refusal)
             if not self._asked[role].take(self._clock.now()):
                 return said(429, "too many requests: try again in a moment")
-            return JSONResponse(await self._do(ask), 200, HEADERS)
+            return JSONResponse(await self._do(ask, admission.counts), 200, HEADERS)
         except ClientDisconnect:
             return said(408, "the request didn't come to its end in time")
         except msgspec.MsgspecError:
@@ -173,7 +188,7 @@ class Recordings:
         except VrsError as error:
             return said(409 if isinstance(error, RecordingError) else 400, str(error))
 
-    async def _do(self, ask: _RecordAsk) -> dict[str, Any]:
+    async def _do(self, ask: _RecordAsk, counts: Callable[[], bool]) -> dict[str, Any]:
         match ask.do:
             case "begin":
                 await self.begin(ask.name)
@@ -181,7 +196,7 @@ class Recordings:
                 problem = await self._recording.end()
                 return {"problem": problem}
             case "copy":
-                return {"path": f"/recordings/copy/{self._ticket(ask.name)}"}
+                return {"path": f"/recordings/copy/{self._ticket(ask.name, counts)}"}
             case "delete":
                 self.delete(ask.name)
             case _:
@@ -221,35 +236,56 @@ class Recordings:
             raise InvalidValueError("recording", name, "one that has ended: this one is being written")
         return path
 
-    def _ticket(self, name: str) -> str:
+    def _ticket(self, name: str, counts: Callable[[], bool]) -> str:
         """A word by which a recording can be fetched once, soon; it opens nothing else."""
         path = self._ended(name)
-        ticket = secrets.token_urlsafe(18)
-        self._tickets[ticket] = path, self._clock.now() + TICKET
+        ticket, state = secrets.token_urlsafe(18), path.lstat()
+        self._tickets[ticket] = _Ticket(path, (state.st_dev, state.st_ino), self._clock.now() + TICKET, counts)
         while len(self._tickets) > 2 * SENT_AT_ONCE:
             self._tickets.popitem(last=False)
         return ticket
 
     async def _copy(self, request: Request) -> Response:
-        path, until = self._tickets.pop(request.path_params["ticket"], (None, 0.0))
-        if path is None or self._clock.now() > until:
+        ticket = self._tickets.pop(request.path_params["ticket"], None)
+        if ticket is None or self._clock.now() > ticket.until or not ticket.counts():
             return said(404, "not here, or not any more")
         if self.sent >= SENT_AT_ONCE:
             return said(503, "too many downloads at once: try again")
-        return _Copy(self, path)
+        try:
+            descriptor = os.open(ticket.path, PLAIN_READ | getattr(os, "O_NOFOLLOW", 0))
+        except OSError:
+            return said(404, "not here, or not any more")
+        state = os.fstat(descriptor)
+        if (state.st_dev, state.st_ino) != ticket.file:
+            os.close(descriptor)
+            return said(404, "not here, or not any more")
+        return _Copy(self, descriptor, ticket)
 
 
-class _Copy(FileResponse):
+class _Copy(Response):
     """A file on its way, counted."""
 
-    def __init__(self, counted: Recordings, path: Path) -> None:
-        super().__init__(path, headers=HEADERS, media_type="application/octet-stream", filename=path.name)
-        self._counted = counted
+    media_type = "application/octet-stream"
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    def __init__(self, counted: Recordings, descriptor: int, ticket: _Ticket) -> None:
+        named = f"attachment; filename*=utf-8''{quote(ticket.path.name)}"
+        super().__init__(None, 200, {**HEADERS, "Content-Disposition": named})
+        self.headers["Content-Length"] = str(os.fstat(descriptor).st_size)
+        self._counted, self._descriptor, self._ticket = counted, descriptor, ticket
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG002 - as ASGI has it
+        left = int(self.headers["Content-Length"])
         self._counted.sent += 1
         try:
-            await super().__call__(scope, receive, send)
+            await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+            with open(self._descriptor, "rb", buffering=0) as file:
+                # It ends early where the token does, and so does the connection.
+                more = True
+                while more and self._ticket.counts():
+                    data = await asyncio.to_thread(file.read, min(left, _CHUNK))
+                    left -= len(data)
+                    await send({"type": "http.response.body", "body": data, "more_body": left > 0})
+                    more = bool(data) and left > 0
         finally:
             self._counted.sent -= 1
 

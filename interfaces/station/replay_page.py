@@ -24,7 +24,7 @@ from interfaces.station.curves import curves
 from interfaces.station.page import station_files
 from interfaces.stream.access import bearer
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.meshcat.page import HEADERS, Viewers, files
+from interfaces.stream.meshcat.page import HEADERS, Authorize, Viewers, files
 from vrs.clock import Clock
 from vrs.errors import VrsError
 
@@ -76,7 +76,7 @@ class ReplayPage:
         playback: Playback,
         clock: Clock,
         *,
-        authorize: Callable[[str | None], bool] | None = None,
+        authorize: Authorize | None = None,
         first: Callable[[float], None] | None = None,
         board: Newest | None = None,
         show: float = SHOW,
@@ -133,7 +133,8 @@ class ReplayPage:
     async def answer_curves(self, request: Request) -> Response:
         """What is plotted of a recording, as JSON."""
         index = request.path_params["index"]
-        if self._authorize is not None and not self._authorize(bearer(request.headers.get("authorization", ""))):
+        token = bearer(request.headers.get("authorization", ""))
+        if self._authorize is not None and self._authorize(request, token).refusal:
             return JSONResponse({"problem": "a token that is valid here, please"}, 403, HEADERS)
         if index >= len(self.playback.tracks):
             return JSONResponse({"problem": "there's no such recording here"}, 404, HEADERS)

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
@@ -19,8 +19,9 @@ from interfaces.recording.recording import Recording, open_recording
 from interfaces.recording.stages import prepare
 from interfaces.station.replay_page import BEGIN, MOST_HEARD, ReplayPage, page_files
 from interfaces.station.shelf import LOOKED_INTO, Shelf
+from interfaces.stream.access import Admission
 from interfaces.stream.meshcat.newest import Newest
-from interfaces.stream.meshcat.page import Viewers
+from interfaces.stream.meshcat.page import Authorize, Viewers
 from interfaces.stream.server import HEADERS
 from robots.robot import Robot
 from vrs.checks import one_of
@@ -48,9 +49,7 @@ _Key: TypeAlias = tuple[tuple[str, ...], Align]
 class _SharedReplay:
     """One play-back, or why there's none; pages that ask for the same share it, and its play head."""
 
-    def __init__(
-        self, key: _Key, allowed: Callable[[str | None], bool], open_: Callable[[_SharedReplay], None]
-    ) -> None:
+    def __init__(self, key: _Key, allowed: Authorize, open_: Callable[[_SharedReplay], None]) -> None:
         self.key = key
         self.board = Newest(BEGIN)
         self.page: ReplayPage | None = None
@@ -59,12 +58,12 @@ class _SharedReplay:
         self.viewers = Viewers(self.board, self.let_in, hear=self._hear, most_heard=MOST_HEARD)
         self.say("opening", "Opening…")
 
-    def let_in(self, token: str | None) -> bool:
-        """Whether one may look; the first who may has it opened."""
-        allowed = self._allowed(token)
-        if allowed and self.task is None:
+    def let_in(self, connection: HTTPConnection, token: str | None) -> Admission:
+        """Decide whether one may look; the first who may has it opened."""
+        admission = self._allowed(connection, token)
+        if not admission.refusal and self.task is None:
             self._open(self)
-        return allowed
+        return admission
 
     def _hear(self, text: str) -> str:
         return "" if self.page is None else self.page.hear(text)
@@ -78,13 +77,13 @@ class _SharedReplay:
 class Replays:
     """The page `/replay?a=NAME&b=NAME&align=…`, beside a running robot. Enter `running` in its loop."""
 
-    def __init__(self, shelf: Shelf, clock: Clock, allowed: Callable[[str | None], bool]) -> None:
+    def __init__(self, shelf: Shelf, clock: Clock, allowed: Authorize) -> None:
         """Wait for pages.
 
         Args:
             shelf: Where recordings are.
             clock: The user's.
-            allowed: Whether a token lets one look.
+            allowed: Whether a token lets one look, see `Viewers`.
         """
         self._shelf, self._clock, self._allowed = shelf, clock, allowed
         self.replays: dict[_Key, _SharedReplay] = {}

@@ -14,7 +14,7 @@ import stat
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from interfaces.link.proxy import Address
 from interfaces.messages.control import Role, covers
@@ -22,6 +22,9 @@ from interfaces.stream.invitations import Invitations
 from interfaces.system import PLAIN_READ, write_whole, written
 from vrs.clock import seconds_since_1970, utc
 from vrs.errors import FormatError, InvalidValueError
+
+if TYPE_CHECKING:
+    from interfaces.stream.audit import AuditLog
 
 TOKEN_BYTES = 32
 """Random bytes of a token."""
@@ -59,6 +62,17 @@ class Person:
         return seconds_since_1970() < self.until
 
 
+class Admission(NamedTuple):
+    """Whether a client gets a role, and whether it may keep it."""
+
+    refusal: str = ""
+    """Why it doesn't get it; empty if it does."""
+    person: str = ""
+    """Whose token was shown; empty where it's nobody's own."""
+    counts: Callable[[], bool] = lambda: True
+    """Whether what was shown counts still: a person's token ends, and its connections with it."""
+
+
 class Access:
     """Decides which role a client gets. It keeps digests of the tokens, never the tokens themselves.
 
@@ -94,29 +108,21 @@ class Access:
             raise InvalidValueError("free", "admin", "roles other than admin")
         self._digests = {Role(role): _digest(token) for role, token in tokens.items()}
         self.invitations = invitations
+        self.audit: AuditLog | None = None
+        """Where doors write who is refused; nowhere unless given."""
         self._file, self._seen = people, (-1, -1)
-        self._people: tuple[Person, ...] = ()
+        self._people: dict[bytes, Person] = {}
         if people is not None:
-            self._people, self._seen = read_people(people), _version(people)
+            self._people = _by_digest(people)
 
     @property
-    def people(self) -> tuple[Person, ...]:
-        """Those of the file, as it is now; as it was, while it can't be read."""
+    def people(self) -> Mapping[bytes, Person]:
+        """Those of the file by their tokens' digests, as it is now; as it was, while it can't be read."""
         if self._file is not None:
             with contextlib.suppress(FormatError, OSError):
                 if (version := _version(self._file)) != self._seen:
-                    self._people, self._seen = read_people(self._file), version
+                    self._people, self._seen = _by_digest(self._file), version
         return self._people
-
-    def person(self, token: str | None) -> str:
-        """Whose token it is; empty where it's nobody's."""
-        shown = _digest("" if token is None else token[: LONGEST_TOKEN + 1])
-        found = [one.name for one in self.people if hmac.compare_digest(one.digest, shown)]
-        return found[0] if found else ""
-
-    def still(self, person: str, role: Role) -> bool:
-        """Whether somebody's token counts, and for a role."""
-        return any(one.name == person and one.counts and covers(one.role, role) for one in self.people)
 
     def __repr__(self) -> str:
         roles = ", ".join(sorted(self._digests))
@@ -128,7 +134,11 @@ class Access:
         return not self._free
 
     def refusal(self, role: Role, token: str | None) -> str:
-        """Why a client can't have a role; empty if it can.
+        """Why a client can't have a role; empty if it can."""
+        return self.admit(role, token).refusal
+
+    def admit(self, role: Role, token: str | None) -> Admission:
+        """Decide whether a client gets a role.
 
         Every token is compared, in constant time, whatever the others gave.
 
@@ -141,18 +151,22 @@ class Access:
         for owner, digest in self._digests.items():
             same = hmac.compare_digest(digest, shown)
             entitled |= same and covers(owner, role)
-        ended = False
-        for one in self.people:
-            same = hmac.compare_digest(one.digest, shown)
-            entitled |= same and one.counts and covers(one.role, role)
-            ended |= same and not one.counts
+        person: Person | None = None
+        for one in self.people.values():
+            if hmac.compare_digest(one.digest, shown):
+                person = one
+        entitled |= person is not None and _counts(person, role)
         member = None if self.invitations is None else self.invitations.member(token)
         entitled |= member is not None and covers(member.role, role)
         if entitled or (token is None and role in self._free):
-            return ""
-        if ended:
-            return ENDED
-        return f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"
+            if person is None:
+                return Admission()
+            digest = person.digest
+            return Admission("", person.name, lambda: _counts(self.people.get(digest), role))
+        if person is not None and not person.counts:
+            return Admission(ENDED, person.name)
+        text = f"the role {role} needs its token" if token is None else f"this token isn't one for the role {role}"
+        return Admission(text, "" if person is None else person.name)
 
 
 def read_tokens(path: Path) -> dict[Role, str]:
@@ -167,6 +181,15 @@ def read_tokens(path: Path) -> dict[Role, str]:
 def read_people(path: Path) -> tuple[Person, ...]:
     """Read the people of a token file; errors as of `read_tokens`."""
     return _read(path)[1]
+
+
+def _by_digest(path: Path) -> dict[bytes, Person]:
+    return {one.digest: one for one in read_people(path)}
+
+
+def _counts(person: Person | None, role: Role) -> bool:
+    """Whether somebody's token is one for a role, and hasn't ended."""
+    return person is not None and person.counts and covers(person.role, role)
 
 
 def _version(path: Path) -> tuple[int, int]:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple, TypeAlias
 
 from interfaces.stream.limits import Bucket
+from interfaces.system import lock
 from vrs.clock import seconds_since_1970
 from vrs.errors import FormatError
 
@@ -77,6 +78,8 @@ class AuditLog:
         except OSError as error:
             raise FormatError(f"audit log {path}", error.strerror or "can't be opened") from None
         try:
+            if not lock(self._file):
+                raise FormatError(f"audit log {path}", "another process writes it: each has a file of its own")
             for one in (path, head_of(path)):
                 one.chmod(0o600)
             self._number, self._hash = self._resume(began)
@@ -134,6 +137,10 @@ class AuditLog:
             self._counted[kind] = self._counted.get(kind, 0) + 1
         self._due = min(self._due, now + COUNTED)
 
+    def health(self) -> dict[str, Fact]:
+        """How it is, for `/health`."""
+        return {"problem": self.problem, "lost": self.lost}
+
     def advance(self) -> None:
         """Write what was counted, when it's time."""
         if seconds_since_1970() >= self._due:
@@ -165,6 +172,9 @@ class AuditLog:
             lost = self.lost
             try:
                 self._write(facts | ({"lost": lost} if lost else {}))
+                if self._queue.empty():
+                    # All that has come meanwhile is on the disk at once.
+                    self._sync()
             except OSError as error:
                 self.lost += 1
                 if not self.problem:
@@ -175,7 +185,13 @@ class AuditLog:
                 if self.problem:
                     self.problem = ""
                     self._failed(f"audit log {self.path} is written again; {lost} lines were lost")
+        with contextlib.suppress(OSError):
+            self._sync()
         self._close_files()
+
+    def _sync(self) -> None:
+        for one in (self._file, self._head):
+            os.fsync(one)
 
     def _write(self, facts: dict[str, Fact]) -> None:
         text = json.dumps(

@@ -14,7 +14,7 @@ import ipaddress
 import os
 import re
 import ssl
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -87,6 +87,54 @@ class Certificate:
             _trust(context, clients)
             context.verify_mode = ssl.CERT_REQUIRED
         return context
+
+
+class ServerTls:
+    """What a server speaks TLS by. Files that have changed count from the next handshake."""
+
+    def __init__(
+        self, certificate: Certificate, clients: Path | None = None, *, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Read the files.
+
+        Args:
+            certificate: The server's.
+            clients: As of `Certificate.server_context`.
+            say: Is told of another certificate, and of one that can't be used: then that from before is shown.
+
+        Raises:
+            FormatError: If a file can't be used.
+        """
+        self._files = tuple(dict.fromkeys((certificate.chain, certificate.key, *([clients] if clients else []))))
+        self._certificate, self._clients, self._say = certificate, clients, say
+        self._read = self._refused = self._versions()
+        self._context = certificate.server_context(clients)
+
+    def context(self) -> ssl.SSLContext:
+        """What the next handshake is done by."""
+        if (now := self._versions()) != self._read:
+            try:
+                found = given_certificate(self._certificate.chain, self._certificate.key)
+                self._context = found.server_context(self._clients)
+            except FormatError as error:
+                # Of two files one may not have been written yet: it's tried again.
+                if now != self._refused:
+                    self._say(f"{error}: the certificate from before is shown")
+                self._refused = now
+            else:
+                self._read = now
+                self._say(f"certificate {found.chain} is read again, SHA-256 {found.shown}")
+        return self._context
+
+    def _versions(self) -> list[tuple[int, int, int] | None]:
+        return [_version(path) for path in self._files]
+
+
+def _version(path: Path) -> tuple[int, int, int] | None:
+    with contextlib.suppress(OSError):
+        state = path.stat()
+        return state.st_mtime_ns, state.st_ino, state.st_size
+    return None
 
 
 def given_certificate(chain: Path, key: Path) -> Certificate:

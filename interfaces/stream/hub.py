@@ -38,7 +38,7 @@ from interfaces.messages.control import (
     may_send,
 )
 from interfaces.messages.jobs import RobotTask, TaskOrder, Tasks
-from interfaces.stream.access import ENDED, Access
+from interfaces.stream.access import ENDED, Access, Admission
 from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, News, SharedEncoder, Value, Welcomed, decode, sent_by
 from interfaces.stream.invitations import Membership, is_code
@@ -481,7 +481,8 @@ class Hub:
         self.site, self.access = site, access
         in_order = self.config.in_order
         classroom = Classroom() if in_order or access.invitations is not None else None
-        self._audit = audit
+        self.audit = audit
+        """Where who has control is written, and what is refused."""
         self.leasing = Leasing(lease, robot, self.limits.sharers, classroom, in_order=in_order, note=self._note)
         """Who may command."""
         self.present = Present()
@@ -522,21 +523,21 @@ class Hub:
         self._now = self._t = -math.inf
 
     def _note(self, event: str, seat: SessionState | None, **facts: str) -> None:
-        if self._audit is not None:
-            self._audit.note(event, robot=self.site.robot, **self._who(seat), **facts)
+        if self.audit is not None:
+            self.audit.note(event, robot=self.site.robot, **self._who(seat), **facts)
 
     def note_stranger(self, session: HubSession, hello: control.Hello, why: str) -> None:
         """Note that a client wasn't let in."""
-        if self._audit is not None:
+        if self.audit is not None:
             address = self._opened.get(session, "")
-            self._audit.refused(
+            self.audit.refused(
                 robot=self.site.robot, what="hello", why=why, who=hello.name, role=hello.role.value, address=address
             )
 
     def note_refused(self, seat: SessionState, what: str, why: str) -> None:
         """Note that a session was refused something."""
-        if self._audit is not None:
-            self._audit.refused(robot=self.site.robot, what=what, why=why, **self._who(seat))
+        if self.audit is not None:
+            self.audit.refused(robot=self.site.robot, what=what, why=why, **self._who(seat))
 
     def _who(self, seat: SessionState | None) -> dict[str, str]:
         if seat is None:
@@ -654,8 +655,8 @@ class Hub:
         """Make the frames that are due at now [s]; the sessions whose `advance` is to be called."""
         self._now, self._sweep = now, now + SWEEP
         self._t = self.site.time(now)
-        if self._audit is not None:
-            self._audit.advance()
+        if self.audit is not None:
+            self.audit.advance()
         self.leasing.turn(now)
         self.site.advance(now=now)
         if self._shown is not None and now >= self._state_due:
@@ -677,7 +678,7 @@ class Hub:
     def _end_people(self) -> None:
         """Close the connections of people whose tokens have ended."""
         for seat, session in self._served.items():
-            if seat.person and not self.access.still(seat.person, seat.role):
+            if not seat.counts():
                 self.note_refused(seat, "token", ENDED)
                 session.close(POLICY, ProblemCode.REFUSED, ENDED)
 
@@ -711,7 +712,8 @@ class Hub:
         if isinstance(member, Problem):
             return member
         role = hello.role if member is None or covers(member.role, hello.role) else member.role
-        refusal = "" if member is not None else self.access.refusal(role, hello.token)
+        admission = Admission() if member is not None else self.access.admit(role, hello.token)
+        refusal = admission.refusal
         if not refusal and role not in _SERVED:
             refusal = f"nothing is here for the role {role}"
         if refusal:
@@ -729,7 +731,7 @@ class Hub:
             before.seat = None
         if member is not None and self.access.invitations is not None:
             self.access.invitations.remember(seat.key, member)
-        seat.alters, seat.person = hello.alters, self.access.person(hello.token)
+        seat.alters, seat.person, seat.counts = hello.alters, admission.person, admission.counts
         self._served[seat] = session
         self.leasing.note(seat, here=True)
         return seat, self._welcome(seat, resumed, now)

@@ -11,9 +11,9 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from interfaces.messages.control import Role
-from interfaces.stream.access import Access, bearer
+from interfaces.stream.access import Access
 from interfaces.stream.invitations import INVITED, Invitation, Invitations
-from interfaces.stream.server import HEADERS
+from interfaces.stream.server import HEADERS, may_see, refusal
 from vrs.clock import Clock
 
 PATH: Final = "/class"
@@ -64,9 +64,6 @@ class JoinPages:
                 parts.append(drawn.getvalue())
         return "".join(parts), max(shown[0].until - now, 0.0)
 
-    def _may_see(self, request: Request) -> bool:
-        return not self._access.refusal(Role.ADMIN, bearer(request.headers.get("authorization", "")))
-
     async def _tell(self, request: Request) -> Response:
         """The codes, for an admin; for others, that there's a class."""
         now = self._clock.now()
@@ -74,11 +71,13 @@ class JoinPages:
             {"role": one.role, "code": one.code, "link": self.link(one), "expires_in": one.until - now}
             for one in self._invitations.shown(now=now)
         ]
-        return JSONResponse({"invitations": told if self._may_see(request) else []}, headers=_PRIVATE)
+        return JSONResponse(
+            {"invitations": told if may_see(request, self._access, Role.ADMIN) else []}, headers=_PRIVATE
+        )
 
     async def _draw(self, request: Request) -> Response:
         """The QR code of a role's link."""
-        if not self._may_see(request):
+        if refusal(request, self._access, Role.ADMIN):
             return Response("an admin's token is needed\n", 403, _PRIVATE, "text/plain")
         shown = dict(zip(INVITED, self._invitations.shown(now=self._clock.now()), strict=True))
         found = next((one for role, one in shown.items() if role == request.path_params["role"]), None)

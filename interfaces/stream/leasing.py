@@ -39,7 +39,7 @@ Wish: TypeAlias = control.LeaseWish | control.Beat
 class SessionState:
     """What a session keeps while its connection is lost: who it is, and its servlet."""
 
-    __slots__ = ("alters", "here", "key", "left", "local", "member", "name", "person", "role", "servlet")
+    __slots__ = ("alters", "counts", "here", "key", "left", "local", "member", "name", "person", "role", "servlet")
 
     def __init__(self, key: str, name: str, role: Role, *, local: bool = False) -> None:
         self.key, self.name, self.role, self.local = key, name, role, local
@@ -52,6 +52,8 @@ class SessionState:
         """Its number in a class; 0 where there's none."""
         self.person = ""
         """Whose token was shown; empty where it's nobody's own."""
+        self.counts: Callable[[], bool] = lambda: True
+        """Whether that counts still."""
         self.alters = False
         """Whether others may correct the paths of its programs."""
 

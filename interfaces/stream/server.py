@@ -15,14 +15,15 @@ from functools import partial
 from typing import Any, Final
 
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from websockets.frames import Opcode
 
 from interfaces.messages.control import Role
-from interfaces.stream.access import Access, bearer, check_host, check_origin
+from interfaces.stream.access import Access, Admission, bearer, check_host, check_origin
+from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding
 from interfaces.stream.hub import Hub, HubSession
 from interfaces.stream.sockets import BoundedWebSocket
@@ -75,6 +76,8 @@ SLICE = 2e-3
 """So long clients' messages may be worked on before all others of the loop have had their turn [s]."""
 LONGEST_WAIT = 0.5
 """After so long at most it's looked again whether a client that has spent too much may go on [s]."""
+LONGEST_NOTED: Final = 100
+"""Characters of what a stranger says that go into the audit log."""
 BLOCKED = 2.0
 """A client is cut off when a message has waited so long to be sent [s]."""
 _LOOK = 0.25
@@ -282,13 +285,50 @@ class HubServer:
             "cut_off": self.cut_off,
             "lease": hub.lease_state.value,
         }
+        if hub.audit is not None:
+            facts["audit"] = hub.audit.health()
         facts |= dict(self._health() if self._health is not None else {})
         return health(facts, bool(facts["ok"]), may_see(request, hub.access, Role.VIEWER))
 
 
+def admit(access: Access, role: Role, connection: HTTPConnection, token: str | None) -> Admission:
+    """Decide whether who comes to a door of HTTP gets a role; a refusal goes into the audit log.
+
+    Args:
+        access: Who may come in.
+        role: What it takes.
+        connection: A request, or a WebSocket that has shown a token.
+        token: That token.
+    """
+    found = access.admit(role, token)
+    if found.refusal and access.audit is not None:
+        person = found.person or None
+        access.audit.refused(
+            what=_asked(connection.scope), why=found.refusal, person=person, role=role.value,
+            address=_address(connection.scope),
+        )  # fmt: skip
+    return found
+
+
+def refusal(request: Request, access: Access, role: Role) -> str:
+    """Why a request isn't one of a role, by the token in its header; empty if it is."""
+    return admit(access, role, request, bearer(request.headers.get("authorization", ""))).refusal
+
+
 def may_see(request: Request, access: Access, role: Role) -> bool:
-    """Whether a request shows a token of a role, or needs none."""
-    return not access.refusal(role, bearer(request.headers.get("authorization", "")))
+    """Whether a request shows a token of a role, or needs none; one without a token is no attempt at a role."""
+    if "authorization" in request.headers:
+        return not refusal(request, access, role)
+    return not access.refusal(role, None)
+
+
+def _asked(scope: Scope) -> str:
+    """What a request is for, for the audit log: strangers choose how long a path is."""
+    return f"{scope.get('method', 'WebSocket')} {scope['path']}"[:LONGEST_NOTED]
+
+
+def _address(scope: Scope) -> str:
+    return str((scope.get("client") or ("",))[0])
 
 
 def health(facts: Mapping[str, Any], ok: bool, known: bool) -> JSONResponse:
@@ -336,12 +376,13 @@ async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
         await PlainTextResponse(REFUSED, 403)(scope, receive, send)
 
 
-def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp:
+def application(routes: Sequence[BaseRoute], allowed: frozenset[str], *, audit: AuditLog | None = None) -> ASGIApp:
     """An application of routes that lets in only what names this server exactly, and comes from no other's page.
 
     Args:
         routes: What it answers.
         allowed: From `access.hosts`.
+        audit: Where it's written who isn't let in; nowhere unless given.
     """
     app = Starlette(routes=list(routes))
 
@@ -352,6 +393,9 @@ def application(routes: Sequence[BaseRoute], allowed: frozenset[str]) -> ASGIApp
             origin = [value for name, value in given if name == b"origin"]
             tls = scope.get("scheme") in {"https", "wss"}
             if not (check_host(host, allowed) and check_origin(origin, allowed, tls=tls)):
+                if audit is not None:
+                    named = ", ".join(host + origin)[:LONGEST_NOTED]
+                    audit.refused(what=_asked(scope), why=f"Host or Origin: {named}", address=_address(scope))
                 await _refuse(scope, receive, send)
                 return
         await app(scope, receive, send)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 import ssl
 from asyncio.transports import BaseTransport, Transport
@@ -22,6 +23,7 @@ from websockets.exceptions import InvalidState
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
+from interfaces.stream.access import ENDED
 from interfaces.stream.limits import Bucket, Strangers
 from interfaces.system import open_files
 from vrs.checks import validated, within
@@ -48,6 +50,8 @@ TURNS = 4
 """Connections with HTTP that are served in one round of the loop."""
 CUT_OFF = 8
 """Connections that are cut off in one round of the loop."""
+PEOPLE = 1.0
+"""So often it's looked whether what a WebSocket was let in by counts still [s]."""
 _LOOK = 0.1
 """Time between two looks at deadlines [s]."""
 CHUNK = 512
@@ -59,6 +63,7 @@ PARTS, PARTS_BURST = 5.0, 100.0
 messages cost, and no client's limits count them."""
 AFTERWARDS = 1000.0
 """Messages that may come after a farewell."""
+_LOG = logging.getLogger(__name__)
 _GRACE = 1.0
 """Time for handlers to end when a server stops [s]."""
 
@@ -123,6 +128,8 @@ class ConnectionState(ServerState):
         self.strangers: Strangers[_Bounded | _Handshake] = Strangers(
             max(1, min(limits.strangers, open_files(FILES) // 4))
         )
+        self.admitted: dict[BoundedWebSocket, tuple[Callable[[], bool], int]] = {}
+        """WebSockets that were let in: whether what they showed counts still, and the close code if it doesn't."""
 
 
 class _Bounded(asyncio.Protocol):
@@ -279,6 +286,7 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Let it go."""
         super().connection_lost(exc)
+        self._state.admitted.pop(self, None)
         # The parser is a generator that holds what holds it.
         self.conn.parser.close()
 
@@ -336,13 +344,22 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
             return False
         if allowed.take(self.loop.time()):
             return True
+        self.end(CloseCode.POLICY_VIOLATION, "too many pings and parts of messages")
+        return False
+
+    def end(self, code: int, reason: str) -> None:
+        """Close the connection, whatever the application is at.
+
+        Args:
+            code: Close code of WebSocket.
+            reason: Why, for people; up to 123 bytes.
+        """
         if not self.close_sent:
-            self.conn.fail(CloseCode.POLICY_VIOLATION, "too many pings and parts of messages")
+            self.conn.fail(code, reason)
             self.transport.write(b"".join(self.conn.data_to_send()))
             self.close_sent = True
         self.transport.close()
         self._begin_phase(FAREWELL)
-        return False
 
     async def receive(self) -> ASGIReceiveEvent:
         """Take the next message; more is read when all that were have been taken."""
@@ -371,15 +388,32 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         del self.scope["state"]["socket"]
         self._begin_phase(FAREWELL)
 
-    def let_stay(self, *, known: bool) -> None:
-        """Give the connection the sizes that who is known may send, and hold its deadlines off."""
+    def let_stay(
+        self, *, known: bool, counts: Callable[[], bool] | None = None, code: int = CloseCode.POLICY_VIOLATION
+    ) -> None:
+        """Give the connection the sizes that who is known may send, and hold its deadlines off.
+
+        Args:
+            known: Whether it has shown who it is.
+            counts: Whether what it has shown counts still: the connection ends a second after it doesn't. None: the
+                application sees to that.
+            code: Close code then.
+        """
         if known:
             self.conn.max_message_size = self.config.ws_max_size
             self._state.strangers.know(self)
+        if counts is not None:
+            self._state.admitted[self] = counts, code
         self._begin_phase()
 
     async def send(self, message: ASGISendEvent) -> None:
-        """Send a message of the application; a farewell has its time."""
+        """Send a message of the application; a farewell has its time.
+
+        Raises:
+            ConnectionResetError: If the connection was closed by itself.
+        """
+        if self.close_sent:
+            raise ConnectionResetError
         await super().send(message)
         if message["type"] == "websocket.close":
             self._begin_phase(FAREWELL)
@@ -396,7 +430,8 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         """
         if not self.writable.is_set():
             await self.writable.wait()
-        if self.disconnected or self.close_sent:
+        # TLS may know of the end before this connection is told; it complains of each write then.
+        if self.disconnected or self.close_sent or self.transport.is_closing():
             raise ConnectionResetError
         size, first = len(data), 0x80 | opcode
         if size < 126:
@@ -412,16 +447,20 @@ class BoundedWebSocket(_Bounded, WebSocketsSansIOProtocol):
         return self.transport.get_write_buffer_size()
 
 
-def let_stay(scope: Scope, *, known: bool) -> None:
+def let_stay(
+    scope: Scope, *, known: bool, counts: Callable[[], bool], code: int = CloseCode.POLICY_VIOLATION
+) -> None:
     """Let whoever is at the other side of an application's WebSocket stay.
 
     Args:
         scope: The application's. Nothing happens where another server than `serve` has it.
         known: Whether it has shown who it is; else it stays as long as nobody else needs its place.
+        counts: Whether what it has shown counts still: the connection ends a second after it doesn't.
+        code: Close code then.
     """
     connection = scope.get("state", {}).get("socket")
     if isinstance(connection, BoundedWebSocket):
-        connection.let_stay(known=known)
+        connection.let_stay(known=known, counts=counts, code=code)
 
 
 def tls_version(scope: Scope) -> str:
@@ -469,7 +508,7 @@ async def serve(
     *,
     largest: int = LARGEST_MESSAGE,
     limits: SocketLimits | None = None,
-    tls: ssl.SSLContext | None = None,
+    tls: Callable[[], ssl.SSLContext] | None = None,
 ) -> AsyncIterator[None]:
     """Serve an ASGI application on a socket, which is closed in the end, with all its connections.
 
@@ -478,7 +517,7 @@ async def serve(
         listening: From `bind`.
         largest: Largest message that is received [bytes].
         limits: Of connections.
-        tls: What TLS is spoken by, from `Certificate.server_context`; None: nothing is encrypted.
+        tls: Gives what a handshake is done by, as `ServerTls.context` does; None: nothing is encrypted.
     """
     config = uvicorn.Config(
         app,  # type: ignore[arg-type]
@@ -498,7 +537,7 @@ async def serve(
     # Signals are left to whoever runs it.
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
-    looking = asyncio.create_task(_cut_off_overdue(state))
+    looking = [asyncio.create_task(look(state)) for look in (_cut_off_overdue, end_admissions)]
     task = asyncio.create_task(server.serve(sockets=[listening] if tls is None else []))
     try:
         while not server.started and not task.done():
@@ -508,7 +547,8 @@ async def serve(
                 await doors.enter_async_context(_tls_door(listening, tls, server, state))
             yield
     finally:
-        looking.cancel()
+        for one in looking:
+            one.cancel()
         server.should_exit = True
         connections = server.server_state.connections
         asyncio.get_running_loop().call_later(_GRACE, _abort_all, connections)
@@ -518,7 +558,7 @@ async def serve(
 
 @contextlib.asynccontextmanager
 async def _tls_door(
-    listening: socket.socket, tls: ssl.SSLContext, server: uvicorn.Server, state: ConnectionState
+    listening: socket.socket, tls: Callable[[], ssl.SSLContext], server: uvicorn.Server, state: ConnectionState
 ) -> AsyncIterator[None]:
     """Take connections that speak TLS, and give them to the server when they have shaken hands."""
     loop = asyncio.get_running_loop()
@@ -532,7 +572,7 @@ async def _tls_door(
             await loop.connect_accepted_socket(
                 http,
                 connection,
-                ssl=tls,
+                ssl=tls(),
                 ssl_handshake_timeout=state.limits.handshake,
                 ssl_shutdown_timeout=FAREWELL,
             )
@@ -578,6 +618,19 @@ async def _cut_off_overdue(state: ConnectionState) -> None:
                 connection.abort()
             # A thousand may be overdue at once: others have their turn in between.
             await asyncio.sleep(0)
+
+
+async def end_admissions(state: ConnectionState) -> None:
+    """Close WebSockets of a server whose tokens have ended, until it's cancelled."""
+    while True:
+        await asyncio.sleep(PEOPLE)
+        for connection, (counts, code) in list(state.admitted.items()):
+            try:
+                if not counts():
+                    connection.end(code, ENDED)
+            except Exception:  # noqa: BLE001 - nobody stays because of it, and the others are looked at
+                _LOG.exception("a connection is cut off")
+                connection.abort()
 
 
 def _abort_all(connections: Iterable[object]) -> None:

@@ -291,13 +291,15 @@ class PageTerminalServer:
 
     def _begin(self, terminal: PageTerminal, scope: Scope) -> None:
         room = self._room
-        monitor = room.monitor(self._access, terminal.token, terminal.session)
-        if monitor is None:
+        address = str((scope.get("client") or ("",))[0])
+        found = room.monitor(self._access, terminal.token, terminal.session, address=address)
+        if found is None:
             terminal.close(_POLICY, "this token opens no terminal")
         elif sum(other.monitor is not None for other in self._terminals) >= MOST:
             terminal.close(_TRY_AGAIN, f"there are {MOST} terminals already: close one elsewhere")
         else:
-            let_stay(scope, known=True)
+            monitor, counts = found
+            let_stay(scope, known=True, counts=counts)
             terminal.begin(monitor, now=room.clock.now())
             room.join(terminal)
 

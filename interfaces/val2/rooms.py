@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -65,18 +66,26 @@ class TerminalRoom:
         """Wait until lines can be read: the first time it takes a second to make the grammar's tables."""
         await asyncio.to_thread(parse_expression, "1")
 
-    def monitor(self, access: Access, token: str | None, session: str | None = None) -> TerminalMonitor | None:
-        """A monitor for whoever shows a token; None for a wrong one.
+    def monitor(
+        self, access: Access, token: str | None, session: str | None = None, *, address: str
+    ) -> tuple[TerminalMonitor, Callable[[], bool]] | None:
+        """A monitor for whoever shows a token, and whether that counts still; None for a wrong one.
 
         Args:
             access: What tokens open.
             token: The token.
             session: By which they command from elsewhere, too.
+            address: Where they come from.
         """
-        read_only = "this token only looks" if access.refusal(Role.OPERATOR, token) else ""
-        if read_only and access.refusal(Role.VIEWER, token):
+        admission, read_only = access.admit(Role.OPERATOR, token), ""
+        if admission.refusal:
+            admission, read_only = access.admit(Role.VIEWER, token), "this token only looks"
+        if admission.refusal:
+            if access.audit is not None:
+                access.audit.refused(what="terminal", why=admission.refusal, address=address)
             return None
-        return TerminalMonitor(self._shared, self._files, self._version, read_only=read_only, session=session)
+        monitor = TerminalMonitor(self._shared, self._files, self._version, read_only=read_only, session=session)
+        return monitor, admission.counts
 
     def correct(self, channel: int, offset: Array, at: float, *, now: float) -> str:
         """Correct the path of the program that alters it on a channel; see `interfaces.stream.hub.PathAlterer`.

@@ -12,13 +12,14 @@ import math
 import re
 import socket
 from collections import deque
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from typing import Final
 
 from typing_extensions import override
 
-from interfaces.stream.access import Access
+from interfaces.stream.access import ENDED, Access
 from interfaces.stream.limits import Strangers
+from interfaces.stream.sockets import PEOPLE
 from interfaces.val2.monitor.monitor import OVERLONG, TerminalMonitor
 from interfaces.val2.monitor.teletype import Input, LineTerminal
 from interfaces.val2.rooms import TerminalRoom
@@ -58,16 +59,19 @@ _FOREIGN_LINE: Final = re.compile(rf"{_OTHER_PROTOCOL.pattern}|[!#$%&'*+.^_`|~0-
 class TcpTerminal(LineTerminal):
     """The terminal of a connection that has shown a token."""
 
-    def __init__(self, writer: asyncio.StreamWriter, monitor: TerminalMonitor, source: Input) -> None:
+    def __init__(
+        self, writer: asyncio.StreamWriter, monitor: TerminalMonitor, source: Input, counts: Callable[[], bool]
+    ) -> None:
         """Begin.
 
         Args:
             writer: Where to.
             monitor: Whose terminal it is.
             source: Makes lines of what comes.
+            counts: Whether the token that was shown counts still.
         """
         super().__init__(self._write, monitor, source, newline=_NEWLINE, at_once=SLICE)
-        self.writer = writer
+        self.writer, self.counts = writer, counts
         self.lost = False
         """Whether output was lost since anything was sent."""
         self._probed_at = math.inf
@@ -162,9 +166,11 @@ class TcpTerminalServer:
         """
         server = await asyncio.start_server(self._serve, sock=listening)
         self.port = listening.getsockname()[1]
+        looking = asyncio.create_task(self._end_admissions())
         try:
             yield self
         finally:
+            looking.cancel()
             server.close()
             for writer in self._unauthenticated:
                 writer.transport.abort()
@@ -174,6 +180,14 @@ class TcpTerminalServer:
                 async with asyncio.timeout(2.0):
                     while self._connections or len(self._unauthenticated):
                         await asyncio.sleep(0.01)
+
+    async def _end_admissions(self) -> None:
+        """Let those go whose tokens have ended."""
+        while True:
+            await asyncio.sleep(PEOPLE)
+            for connection in [one for one in self._connections if not one.counts()]:
+                connection.writer.write(f"{_NEWLINE}*Invalid token* {ENDED}{_NEWLINE}".encode())
+                connection.leave(now=self._room.clock.now())
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         connection = await self._let_in(reader, writer)
@@ -219,12 +233,14 @@ class TcpTerminalServer:
             while lines:
                 text = lines.popleft().strip()
                 characters += len(text) + 1
-                monitor = self._room.monitor(self._access, text) if text else None
-                if monitor is not None and len(self._connections) >= MOST:
+                address = str(writer.get_extra_info("peername", ("",))[0])
+                found = self._room.monitor(self._access, text, address=address) if text else None
+                if found is not None and len(self._connections) >= MOST:
                     writer.write(f"*Too many terminals* {MOST} at most{_NEWLINE}".encode())
                     return None
-                if monitor is not None:
-                    terminal = TcpTerminal(writer, monitor, source)
+                if found is not None:
+                    monitor, counts = found
+                    terminal = TcpTerminal(writer, monitor, source, counts)
                     terminal.take(lines, ended=not data)
                     monitor.start(now=self._room.clock.now())
                     return terminal

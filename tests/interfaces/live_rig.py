@@ -97,7 +97,8 @@ async def robot_here(
     udp = None if datagrams is None else socket.socket(type=socket.SOCK_DGRAM)
     if udp is not None:
         udp.bind(("127.0.0.1", 0 if datagrams else port))
-    async with sockets.serve(app, listening, largest=LARGEST, tls=tls), robot.running(udp):
+    shaking = None if tls is None else lambda: tls
+    async with sockets.serve(app, listening, largest=LARGEST, tls=shaking), robot.running(udp):
         await robot.ready()
         yield robot, f"{'ws' if tls is None else 'wss'}://127.0.0.1:{port}/site"
 
@@ -108,13 +109,14 @@ async def operator_here(
     *,
     delay: str = "none",
     certificate: Certificate | None = None,
+    token: str | None = None,
     blocked: Callable[[str], None] | None = None,
 ) -> AsyncIterator[tuple[LiveOperator, str]]:
     """An operator's site in this loop, and its URL for programs; it wants datagrams where `blocked` is given."""
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate)
+    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate, robot_token=token)
     if blocked is not None:
         config = replace(config, datagrams=True, blocked=blocked)
     operator = LiveOperator(config, Access(free=OPEN))

@@ -199,7 +199,7 @@ def test_a_site_uses_no_bad_sample_brakes_if_they_last_and_goes_on_by_resume(bad
 
 
 @pytest.mark.parametrize("watchdog", [None, WatchdogConfig()])
-def test_a_joint_that_seizes_is_a_typed_abort_and_the_arm_goes_on_once_it_is_free(watchdog: Any) -> None:
+def test_t13_a_joint_that_seizes_is_a_typed_abort_and_the_arm_goes_on_once_it_is_free(watchdog: Any) -> None:
     ends = Spoilt(RobotSiteConfig(watchdog=watchdog))
     ends.go()
     ends.operator.robot.execute(to(READY, speed=0.5), now=ends.now)

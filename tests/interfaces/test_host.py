@@ -199,7 +199,7 @@ def test_a_robot_that_starts_anew_waits_for_a_resume() -> None:
 
 
 @pytest.mark.parametrize("moving_for", [0.3, 0.55, 0.8, 1.1])
-def test_without_its_operator_the_robot_stops_in_time_and_takes_the_next(moving_for: float) -> None:
+def test_t12_without_its_operator_the_robot_stops_in_time_and_takes_the_next(moving_for: float) -> None:
     ends = Ends(site=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))
     ends.go()
     ends.operator.robot.execute(to(READY), now=ends.now)

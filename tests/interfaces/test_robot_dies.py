@@ -74,7 +74,7 @@ def serving(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 
 
 @pytest.mark.parametrize("robot", ["puma560", "ipr"])
-def test_a_robot_that_dies_is_told_everywhere(robot: str) -> None:
+def test_t13_a_robot_that_dies_is_told_everywhere(robot: str) -> None:
     with serving("--robot", robot) as (process, url):
         until(lambda: health(url)[1]["connected"])
         assert health(url)[0] == 200

@@ -154,7 +154,7 @@ def test_an_arm_that_is_held_stops_and_goes_on_only_when_told() -> None:
     assert np.abs(lab.measured[-1] - NOMINAL).max() < 1e-9
 
 
-def test_after_an_outage_nothing_from_before_it_is_executed() -> None:
+def test_t08_after_an_outage_nothing_from_before_it_is_executed() -> None:
     """Watchdog: the robot stops within T_loss + 20 ms, whatever it does, and waits for a new epoch."""
     operator = OperatorSite(VirtualArm(MODEL, NOMINAL, now=0.0))
     robot = FollowingArm(MODEL, NOMINAL, now=0.0, config=RobotSiteConfig(watchdog=WatchdogConfig(timeout=0.5)))

@@ -8,6 +8,7 @@ import math
 import secrets
 from collections.abc import AsyncIterator, Callable, Hashable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import routes as view_routes
-from interfaces.stream.server import HubServer
+from interfaces.stream.server import HubServer, admit
 from interfaces.teleop import OperatorSiteConfig
 from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
@@ -150,7 +151,7 @@ class LiveOperator(LeasedRobot, Workers):
             twins.site, lease, access, self, config=hub, emulation=self.emulation, workers=workers, audit=audit
         )
         self.server = HubServer(self.hub, self.clock, health=self.health, turned=self._turning.soon)
-        self._view = view_routes(self.scene, authorize=lambda token: not access.refusal(Role.VIEWER, token))
+        self._view = view_routes(self.scene, authorize=partial(admit, access, Role.VIEWER))
         self.recording = SiteRecording(
             config.recording, self.line, self.clock, lambda: self.robot.connected, self._around, seed=config.seed
         )

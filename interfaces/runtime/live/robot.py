@@ -100,7 +100,7 @@ class LiveRobot:
             audit: Where it's written whom it follows, and who is refused; nowhere unless given.
         """
         self.body, self.clock, self.host = body, body.clock, body.host
-        self._access, self._program = access, server
+        self._access, self._program, self._audit = access, server, audit
         self.instance = secrets.token_urlsafe(9)
         self._turning = Turning(self.clock, self._turn)
         self._server = RobotServer(
@@ -189,6 +189,7 @@ class LiveRobot:
             "link_loss": self._attached().link_loss,
             "datagrams": self._server.datagrams,
             **body.health(),
+            **({} if self._audit is None else {"audit": self._audit.health()}),
             "timer_late": self._turning.lateness.worst,
         }
 

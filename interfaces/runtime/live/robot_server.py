@@ -55,6 +55,8 @@ class _OperatorConnection:
         self.close: tuple[int, str] | None = None
         self.problems = 0
         self.datagrams: RobotDatagrams | None = None
+        self.counts: Callable[[], bool] = lambda: True
+        """Whether the token that was shown counts still."""
 
     def send(self, message: Value) -> bytes:
         data = encode(message, self.encoding)
@@ -150,7 +152,7 @@ class RobotServer:
             except TimeoutError:
                 refusal = Problem(ProblemCode.HELLO_LATE, f"no hello within {HELLO:g} s", fatal=True)
             if refusal is None:
-                let_stay(scope, known=True)
+                let_stay(scope, known=True, counts=connection.counts)
                 self._note("followed", address)
             else:
                 if self._audit is not None:
@@ -176,11 +178,11 @@ class RobotServer:
         """Take the first message; why it can't be, or None if the operator is followed from now on."""
         try:
             hello = decode(_data(message), connection.encoding, allowed=Hello)
-            refused = self._access.refusal(Role.SITE, hello.token)
+            admission = self._access.admit(Role.SITE, hello.token)
             if hello.protocol != PROTOCOL:
                 return Problem(ProblemCode.VERSION, f"this is version {PROTOCOL} of the protocol", fatal=True)
-            if hello.role is not Role.SITE or refused:
-                text = refused or "only an operator's site comes here"
+            if hello.role is not Role.SITE or admission.refusal:
+                text = admission.refusal or "only an operator's site comes here"
                 return Problem(ProblemCode.REFUSED, text, fatal=True)
             asked = hello.link_loss
             loss = None if asked is None else LossPolicy(one_of("link_loss", asked, LossPolicy))
@@ -193,7 +195,7 @@ class RobotServer:
             return Problem(ProblemCode.FULL, busy, fatal=True)
         if self._connection is not None:
             self._connection.end(_POLICY, "the same site has connected again")
-        self._connection = connection
+        self._connection, connection.counts = connection, admission.counts
         attached = self._attached()
         if hello.datagrams and self._socket is not None and tls in _KEEPS_SECRETS:
             secret = secrets.token_urlsafe(32)

@@ -7,7 +7,7 @@ import json
 from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache
 from importlib import resources
-from typing import Final
+from typing import Final, TypeAlias
 from urllib.parse import urlsplit
 
 from starlette.requests import HTTPConnection, Request
@@ -16,6 +16,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from interfaces.stream import server
+from interfaces.stream.access import Admission
 from interfaces.stream.meshcat.meshes import viewer_bundle
 from interfaces.stream.meshcat.newest import Newest
 from interfaces.stream.sockets import let_stay
@@ -36,6 +37,8 @@ MOST_HEARD: Final = 20
 """Messages that a viewer may send in HEARD_PERIOD."""
 HEARD_PERIOD: Final = 10.0
 """[s]."""
+Authorize: TypeAlias = Callable[[HTTPConnection, str | None], Admission]
+"""Decides whether a token that was shown lets a viewer in."""
 POLICY_VIOLATION, TRY_AGAIN_LATER, UNAUTHORISED = 1008, 1013, 4401
 
 
@@ -51,7 +54,7 @@ class Viewers:
     def __init__(
         self,
         source: Newest,
-        authorize: Callable[[str | None], bool] | None = None,
+        authorize: Authorize | None = None,
         *,
         hear: Callable[[str], str] | None = None,
         most_heard: int = MOST_HEARD,
@@ -60,7 +63,7 @@ class Viewers:
 
         Args:
             source: What all of them see.
-            authorize: Whether a token lets a viewer in; None lets all in.
+            authorize: Whether a token lets a viewer in, and as long as it does; None lets all in.
             hear: Takes what a viewer says; its answer, unless empty, goes to that one. None: nobody listens.
             most_heard: Messages that a viewer may send in 10 s.
         """
@@ -77,13 +80,14 @@ class Viewers:
         batches = BATCHES in websocket.scope["subprotocols"]
         try:
             await websocket.accept(subprotocol=BATCHES if batches else None)
-            said = ""
+            said, admission = "", Admission()
             if self._authorize is not None:
                 said = await first_text(websocket)
-                if not self._authorize(token_in(said)):
+                admission = self._authorize(websocket, token_in(said))
+                if admission.refusal:
                     await websocket.close(UNAUTHORISED, "a token that is valid here, please")
                     return
-            let_stay(websocket.scope, known=bool(said))
+            let_stay(websocket.scope, known=bool(said), counts=admission.counts, code=UNAUTHORISED)
             try:
                 viewer = _Viewer(websocket, self._source, batches, self._hear, self._most_heard)
             except InvalidValueError:
@@ -237,12 +241,12 @@ PARTS: Final = ("sheets.js", "meshcat.js", "scene.js", "licences.txt")
 _TYPES: Final = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".txt": "text/plain"}
 
 
-def routes(scene: Newest, *, authorize: Callable[[str | None], bool] | None = None) -> list[BaseRoute]:
+def routes(scene: Newest, *, authorize: Authorize | None = None) -> list[BaseRoute]:
     """Make the routes of the page, of its files and of the WebSocket.
 
     Args:
         scene: What all viewers see.
-        authorize: Whether a token lets a viewer in; None lets all in.
+        authorize: See `Viewers`.
     """
     viewers = Viewers(scene, authorize)
     return [*files("view", "interfaces.stream"), WebSocketRoute("/meshcat", viewers.serve)]

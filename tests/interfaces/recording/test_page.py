@@ -18,7 +18,7 @@ from interfaces.recording.playback import Playback
 from interfaces.recording.recording import open_recording
 from interfaces.station.replay_page import CELLS, ReplayPage, grouped
 from interfaces.stream import sockets
-from interfaces.stream.access import hosts
+from interfaces.stream.access import Admission, hosts
 from interfaces.stream.server import application
 from tests.interfaces.pages import until, wait
 from tests.interfaces.recording.made import MODEL, make
@@ -306,7 +306,9 @@ def flood(websocket):
 
 
 def test_a_token_is_asked_for_and_a_flood_is_ended(files):
-    with served(files[0][0], authorize=lambda token: token == "right") as server:
+    with served(
+        files[0][0], authorize=lambda _, token: Admission("" if token == "right" else "another one")
+    ) as server:
         with board(server) as websocket:
             websocket.send('{"token":"wrong"}')
             with pytest.raises(ConnectionClosed):

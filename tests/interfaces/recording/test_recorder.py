@@ -360,7 +360,7 @@ def test_a_full_file_system(tmp_path: Path) -> None:
         subprocess.run(["umount", str(tmp_path)], check=True)
 
 
-def test_a_recording_is_its_owners(tmp_path):
+def test_t15_a_recording_is_its_owners(tmp_path):
     path, kept = tmp_path / "new.mcap", tmp_path / "kept.mcap"
     before = os.umask(0)
     try:

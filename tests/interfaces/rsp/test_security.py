@@ -52,7 +52,7 @@ def state(pair: Pair) -> tuple:
 
 
 @pytest.mark.parametrize("sealed", [False, True])
-def test_a_spoofed_session_is_dropped_and_counted(sealed: bool) -> None:
+def test_t16_a_spoofed_session_is_dropped_and_counted(sealed: bool) -> None:
     pair = pair_of(sealed=sealed)
     data, before = next_down(pair), state(pair)
     other = data[:12] + bytes([data[12] ^ 1]) + data[13:]
@@ -62,7 +62,7 @@ def test_a_spoofed_session_is_dropped_and_counted(sealed: bool) -> None:
     assert state(pair) == before
 
 
-def test_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
+def test_t16_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
     pair = pair_of(sealed=True)
     data, before = next_down(pair), state(pair)
     assert len(data) == 20 + 24 + 2 + 2
@@ -78,7 +78,7 @@ def test_every_flipped_bit_of_a_sealed_packet_is_dropped_and_counted() -> None:
 
 
 @pytest.mark.parametrize(("sealed", "reason"), [(False, DropReason.LATE), (True, DropReason.REPLAY)])
-def test_a_replayed_packet_is_dropped_and_counted(sealed: bool, reason: DropReason) -> None:
+def test_t16_a_replayed_packet_is_dropped_and_counted(sealed: bool, reason: DropReason) -> None:
     pair = pair_of(sealed=sealed)
     data = next_down(pair)
     pair.robot.receive(data, ADDRESS, now=pair.now)
@@ -150,7 +150,7 @@ def test_a_replayed_opening_takes_nothing_over() -> None:
 
 
 @pytest.mark.parametrize("sealed", [False, True])
-def test_no_answer_is_longer_than_its_question_and_asking_leaves_nothing(sealed: bool) -> None:
+def test_t16_no_answer_is_longer_than_its_question_and_asking_leaves_nothing(sealed: bool) -> None:
     random, keys = Random(1), KEYS if sealed else None
     robot = RobotCore(MODEL, random.randbytes, keys=keys)
     for k in range(300):

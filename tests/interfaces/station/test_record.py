@@ -213,7 +213,7 @@ def test_two_side_by_side_share_the_cursor(page: Page, recorded: tuple[Path, Pat
     shown.close()
 
 
-def test_wrong_names_and_rights_are_refused_with_one_message(page: Page, served: Served) -> None:
+def test_t15_wrong_names_and_rights_are_refused_with_one_message(page: Page, served: Served) -> None:
     page.refused = True
     taken = served.directory / "taken.mcap"
     taken.write_bytes(b"somebody's")

@@ -80,12 +80,12 @@ class ServingHub(Serving):
 
 
 @contextlib.asynccontextmanager
-async def _serving(sockets=None, tls=None, port=0, **options):
+async def _serving(sockets=None, tls=None, shaking=None, port=0, **options):
     clock, listening = WallClock(0.0), bind(port=port)
     server = HubServer(make_hub(now=clock.now(), **options), clock)
     serving = ServingHub(listening.getsockname()[1], server)
     app = application(server.routes, hosts(["127.0.0.1", "localhost"], serving.port))
-    async with serve(app, listening, limits=sockets, tls=tls), server.running():
+    async with serve(app, listening, limits=sockets, tls=shaking if tls is None else lambda: tls), server.running():
         yield serving
 
 

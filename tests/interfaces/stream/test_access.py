@@ -24,7 +24,7 @@ from vrs.errors import FormatError, InvalidValueError
 TOKENS = {Role.VIEWER: "v" * 43, Role.OPERATOR: "o" * 43, Role.ADMIN: "a" * 43, Role.SITE: "s" * 43}
 
 
-def test_a_token_opens_its_role_and_those_below():
+def test_t03_a_token_opens_its_role_and_those_below():
     access = Access(TOKENS, free=())
     opens = {(owner, role) for owner in Role for role in Role if not access.refusal(role, TOKENS[owner])}
     assert opens == {
@@ -39,7 +39,7 @@ def test_a_token_opens_its_role_and_those_below():
 
 
 @pytest.mark.parametrize("token", [None, "", "x" * 43, "a" * 42, "a" * 44, "a" * 100_000, "ä" * 43])
-def test_nothing_else_opens_anything(token):
+def test_t03_nothing_else_opens_anything(token):
     access = Access(TOKENS, free=())
     assert access.needs_tokens
     assert all(access.refusal(role, token) for role in Role)
@@ -56,7 +56,7 @@ def test_on_the_loopback_all_but_admins_and_sites_need_none():
         Access(free={Role.ADMIN})
 
 
-def test_a_token_shows_nowhere():
+def test_t04_a_token_shows_nowhere():
     access = Access(TOKENS, free=())
     said = [repr(access), str(vars(access)), *(access.refusal(role, "b" * 43) for role in Role)]
     assert not any(token in text for token in [*TOKENS.values(), "b" * 43] for text in said)
@@ -105,7 +105,7 @@ def test_a_made_file_is_read_back(tmp_path):
 
 
 @pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o660, 0o400, 0o700])
-def test_a_file_that_others_may_read_is_refused(tmp_path, mode):
+def test_t04_a_file_that_others_may_read_is_refused(tmp_path, mode):
     path = tmp_path / "tokens"
     make_tokens(path)
     path.chmod(mode)
@@ -146,26 +146,24 @@ def test_people_have_tokens_of_their_own_that_end(tmp_path, monkeypatch):
     assert not access.refusal(Role.VIEWER, bo)
     assert access.refusal(Role.OPERATOR, bo)
     assert access.refusal(Role.ADMIN, ada)
-    assert (access.person(ada), access.person(bo), access.person("x" * 43), access.person(None)) == (
-        "ada",
-        "bo",
-        "",
-        "",
-    )
+    shown = [access.admit(Role.VIEWER, token) for token in (ada, bo, "x" * 43, None)]
+    assert [one.person for one in shown] == ["ada", "bo", "", ""]
+    assert access.admit(Role.OPERATOR, bo).person == "bo"
+    kept = access.admit(Role.ADMIN, read_tokens(path)[Role.ADMIN])
     assert not access.refusal(Role.ADMIN, read_tokens(path)[Role.ADMIN])
     end_of_january = 3789590400.0
     monkeypatch.setattr("interfaces.stream.access.seconds_since_1970", lambda: end_of_january - 1.0)
     assert not access.refusal(Role.OPERATOR, ada)
     monkeypatch.setattr("interfaces.stream.access.seconds_since_1970", lambda: end_of_january)
     assert access.refusal(Role.OPERATOR, ada) == "this token has ended: ask for another one"
-    assert not access.still("ada", Role.VIEWER)
-    assert access.still("bo", Role.VIEWER)
-    assert not access.still("bo", Role.OPERATOR)
+    assert [one.counts() for one in (shown[0], shown[1], kept)] == [False, True, True]
     end_person(path, "bo")
     assert access.refusal(Role.VIEWER, bo)
-    assert [one.name for one in access.people] == ["ada"]
+    again = access.admit(Role.VIEWER, add_person(path, "bo", Role.VIEWER, "2090-02-01"))
+    assert [one.counts() for one in (shown[1], again, kept)] == [False, True, True]
+    assert sorted(one.name for one in access.people.values()) == ["ada", "bo"]
     path.write_text("rubbish")
-    assert [one.name for one in access.people] == ["ada"]
+    assert sorted(one.name for one in access.people.values()) == ["ada", "bo"]
 
 
 @pytest.mark.parametrize(

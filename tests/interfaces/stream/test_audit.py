@@ -86,7 +86,7 @@ def _whole_line_of_ones_own(lines: list[bytes]) -> list[bytes]:
         (lambda lines: [*lines[:4], lines[4].replace(b'"n":5', b'"n":6'), *lines[5:]], "line 5 is missing"),
     ],
 )
-def test_each_kind_of_tampering_is_found_where_it_is(
+def test_t14_each_kind_of_tampering_is_found_where_it_is(
     path: Path, tamper: Callable[[list[bytes]], list[bytes]], says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path.write_bytes(b"".join(tamper(path.read_bytes().splitlines(keepends=True))))
@@ -221,6 +221,31 @@ def test_a_full_disk_is_told_once_and_lines_that_are_lost_are_counted(
     assert [one.get("lost") for one in facts(path)] == [None, None, 2, None]
     assert len(said) == 2
     assert "space" in said[0]
+
+
+def test_lines_are_on_the_disk_and_one_that_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, fails, kept, fsync = tmp_path / "audit.jsonl", [False], [0], os.fsync
+
+    def syncing(file: int) -> None:
+        if fails[0]:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        fsync(file)
+        kept[0] = path.stat().st_size
+
+    monkeypatch.setattr(os, "fsync", syncing)
+    log = AuditLog(path)
+    log.note("control", who="Ada")
+    _until(lambda: path.read_bytes().count(b"\n") == 2 and kept[0] == path.stat().st_size)
+    assert log.health() == {"problem": "", "lost": 0}
+    fails[0] = True
+    log.note("control", who="Bo")
+    _until(lambda: log.health() == {"problem": f"audit log {path}: Input/output error", "lost": 1})
+    with pytest.raises(FormatError, match="another process writes it"):
+        AuditLog(path)
+    fails[0] = False
+    log.close()
+    assert check_audit(path).problem == ""
+    AuditLog(path).close()
 
 
 def _until(holds: Callable[[], bool]) -> None:

@@ -10,6 +10,7 @@ import socket
 import ssl
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,14 @@ from interfaces.cli.options import certificate_for, names_of
 from interfaces.messages.control import Role
 from interfaces.stream import certificates
 from interfaces.stream.access import Access, make_tokens
-from interfaces.stream.certificates import Certificate, given_certificate, own_certificate, peer, server_url
+from interfaces.stream.certificates import (
+    Certificate,
+    ServerTls,
+    given_certificate,
+    own_certificate,
+    peer,
+    server_url,
+)
 from interfaces.stream.client_socket import UnreachableError
 from interfaces.stream.sockets import SocketLimits
 from tests.interfaces import live_rig
@@ -97,7 +105,7 @@ def test_one_that_is_about_to_end_is_made_anew(tmp_path: Path, monkeypatch: pyte
     assert own_certificate(path, NAMES).fingerprint == new.fingerprint
 
 
-def test_a_key_that_others_may_read_isnt_used(tmp_path: Path) -> None:
+def test_t04_a_key_that_others_may_read_isnt_used(tmp_path: Path) -> None:
     path = tmp_path / "tls.pem"
     own_certificate(path, NAMES)
     path.chmod(0o640)
@@ -115,7 +123,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path, shown: Certificate, oth
         given_certificate(shown.chain, other.key)
 
 
-def test_old_versions_and_weak_suites_are_refused(shown: Certificate) -> None:
+def test_t01_old_versions_and_weak_suites_are_refused(shown: Certificate) -> None:
     with served(tls=shown.server_context()) as serving:
         assert shaken(serving.port, willing()).startswith("TLSv1.3 ")
         for version in (ssl.TLSVersion.TLSv1, ssl.TLSVersion.TLSv1_1):
@@ -169,7 +177,9 @@ def test_a_stranger_comes_in_by_tls(shown: Certificate) -> None:
             assert stranger.order(type="stop")["receipt"]["status"] == "accepted"
 
 
-def test_another_certificate_is_refused_at_once_and_after_a_restart(shown: Certificate, other: Certificate) -> None:
+def test_t01_another_certificate_is_refused_at_once_and_after_a_restart(
+    shown: Certificate, other: Certificate
+) -> None:
     with served(tls=other.server_context()) as serving:
         with pytest.raises(
             UnreachableError, match=rf"sha256={other.fingerprint}, expected sha256={shown.fingerprint}"
@@ -218,7 +228,7 @@ def test_the_console_says_in_a_line_that_a_certificate_is_another(
     assert "its certificate is another" in said
 
 
-def test_nothing_goes_off_this_machine_in_plain() -> None:
+def test_t01_nothing_goes_off_this_machine_in_plain() -> None:
     assert server_url("127.0.0.1:8600") == "ws://127.0.0.1:8600/ws"
     assert server_url("[::1]:8600") == "ws://[::1]:8600/ws"
     assert server_url("192.0.2.1:8600") == "wss://192.0.2.1:8600/ws"
@@ -277,7 +287,7 @@ def test_pages_come_by_https_alone(shown: Certificate) -> None:
             line.close()
 
 
-def test_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
+def test_t10_handshakes_have_a_deadline_and_give_way(shown: Certificate) -> None:
     limits = SocketLimits(strangers=3, handshake=1.0)
     with served(tls=shown.server_context(), sockets=limits) as serving:
         idle = [socket.create_connection(("127.0.0.1", serving.port), 5.0) for _ in range(4)]
@@ -334,7 +344,9 @@ def test_a_robots_health_is_told_to_sites() -> None:
     asyncio.run(main())
 
 
-def test_the_sites_know_each_other_by_certificates(shown: Certificate, other: Certificate, tmp_path: Path) -> None:
+def test_t02_the_sites_know_each_other_by_certificates(
+    shown: Certificate, other: Certificate, tmp_path: Path
+) -> None:
     site = own_certificate(tmp_path / "site.pem", (), client=True)
     stranger = own_certificate(tmp_path / "stranger.pem", (), client=True)
 
@@ -353,3 +365,58 @@ def test_the_sites_know_each_other_by_certificates(shown: Certificate, other: Ce
             assert "certificate" in await met(port, shown, stranger)
 
     asyncio.run(main())
+
+
+def test_a_renewed_certificate_counts_from_the_next_handshake(
+    tmp_path: Path, shown: Certificate, other: Certificate
+) -> None:
+    chain, key, said = tmp_path / "chain.pem", tmp_path / "key.pem", list[str]()
+
+    def write(certificate: Certificate, *files: Path) -> None:
+        for file in files:
+            file.write_bytes(certificate.chain.read_bytes())
+
+    write(shown, chain, key)
+    tls = ServerTls(given_certificate(chain, key), say=said.append)
+    with served(shaking=tls.context) as serving:
+        with connect(address(serving.port, shown)) as robot:
+            write(other, chain)
+            # Its key isn't there yet.
+            connect(address(serving.port, shown)).close()
+            connect(address(serving.port, shown)).close()
+            assert len(said) == 1
+            assert "the certificate from before is shown" in said[0]
+            write(other, key)
+            connect(address(serving.port, other)).close()
+            assert said[1] == f"certificate {chain} is read again, SHA-256 {other.shown}"
+            assert robot.is_connected
+        with pytest.raises(UnreachableError, match="its certificate is another"):
+            connect(address(serving.port, shown))
+        chain.unlink()
+        connect(address(serving.port, other)).close()
+        assert "No such file" in said[2]
+
+
+def test_t02_a_site_whose_certificate_was_replaced_comes_in_no_more(tmp_path: Path, shown: Certificate) -> None:
+    old = own_certificate(tmp_path / "site.pem", (), client=True)
+    kept = replace(old, chain=tmp_path / "old.pem", key=tmp_path / "old.pem")
+    kept.chain.write_bytes(old.chain.read_bytes())
+    tls = ServerTls(shown, old.chain)
+    with served(shaking=tls.context) as serving:
+
+        def asked(own: Certificate) -> int:
+            context = willing()
+            context.load_cert_chain(own.chain, own.key)
+            line = http.client.HTTPSConnection("127.0.0.1", serving.port, context=context)
+            try:
+                line.request("GET", "/health")
+                return line.getresponse().status
+            finally:
+                line.close()
+
+        assert asked(kept) == 200
+        old.chain.unlink()
+        new = own_certificate(old.chain, (), client=True)
+        assert asked(new) == 200
+        with pytest.raises((ssl.SSLError, ConnectionError, http.client.HTTPException)):
+            asked(kept)

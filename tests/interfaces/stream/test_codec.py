@@ -227,7 +227,7 @@ BOMBS: dict[str, tuple[Encoding, bytes]] = {
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_bombs_are_refused_in_little_time_and_memory(name: str) -> None:
+def test_t09_bombs_are_refused_in_little_time_and_memory(name: str) -> None:
     encoding, frame = BOMBS[name]
     everything = m.Request | m.Reply | c.Question | c.Notice
     tracemalloc.start()

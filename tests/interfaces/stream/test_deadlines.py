@@ -105,7 +105,7 @@ def lives(connection: socket.socket, drips: bytes, *, read: bool = True) -> floa
         "a second request", "after pipelined ones", "a body that nobody reads",
     ],
 )  # fmt: skip
-def test_what_drips_over_http_ends(first: bytes, drips: bytes) -> None:
+def test_t10_what_drips_over_http_ends(first: bytes, drips: bytes) -> None:
     with serving.served(ROUTES, limits=SHORT) as server, dialled(server.port) as connection:
         connection.sendall(first)
         assert lives(connection, drips) < 2 * 0.4 + SLACK
@@ -173,7 +173,7 @@ def pongs(peer) -> bool:
 
 
 @pytest.mark.parametrize("upgraded", [False, True], ids=["silent", "without a hello"])
-def test_idle_connections_lock_nobody_out(upgraded: bool) -> None:
+def test_t10_idle_connections_lock_nobody_out(upgraded: bool) -> None:
     """Neither a newcomer nor an operator who was cut off; who has said who it is stays."""
     with (
         served(sockets=SocketLimits(strangers=ROOM)) as server,

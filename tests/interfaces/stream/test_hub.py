@@ -102,7 +102,7 @@ def test_a_stale_release_clears_nothing():
     assert two.tell(Order(1, to(1), new), now=0.4)[0].refusal == ""
 
 
-def test_take_over_needs_an_admin_and_passes_through_a_stop():
+def test_t07_take_over_needs_an_admin_and_passes_through_a_stop():
     hub = make_hub(stops=False)
     peer, epoch = holder(hub)
     other = Peer(hub, now=0.1)
@@ -290,7 +290,7 @@ def test_who_shows_the_holder_s_session_commands_under_its_epoch():
 
 
 @pytest.mark.parametrize("shown", ["", "wrong", "own", "of one who has no lease"])
-def test_only_the_holder_s_session_opens_its_lease(shown):
+def test_t07_only_the_holder_s_session_opens_its_lease(shown):
     hub = make_hub()
     owner, epoch = holder(hub)
     other, third, viewer = Peer(hub), Peer(hub), Peer(hub, role=Role.VIEWER)

@@ -63,7 +63,7 @@ def test_codes_are_renewed_and_the_old_ones_count_a_little_longer():
     assert invitations.redeem(new, now=10 * RENEWED) is None, "nobody had looked since"
 
 
-def test_tries_are_limited_by_address_and_in_total():
+def test_t17_tries_are_limited_by_address_and_in_total():
     invitations = Invitations(0.0)
     one = sum(invitations.may_try("one", now=0.0) for _ in range(1000))
     assert one == inv.OF_ADDRESS_AT_ONCE

@@ -101,7 +101,7 @@ def state(hub: Any, peer: Peer) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("encoding", Encoding)
 @pytest.mark.parametrize("message", clients(), ids=lambda m: m["type"])
-def test_a_bad_number_of_a_client_changes_nothing(message: dict[str, Any], encoding: Encoding) -> None:
+def test_t09_a_bad_number_of_a_client_changes_nothing(message: dict[str, Any], encoding: Encoding) -> None:
     hub = make_hub(limits=ClientLimits(bad=1000, burst=100_000))
     peer = Peer(hub, role=Role.OPERATOR, encoding=encoding, greet=message["type"] != "hello")
     if message["type"] != "hello":

@@ -73,7 +73,7 @@ def test_both_encodings_health_and_frames():
         assert (health["ok"], health["robot"], health["lease"]) == (True, "puma560", "free")
 
 
-def test_without_a_token_health_says_whether_all_is_well_and_no_more():
+def test_t03_without_a_token_health_says_whether_all_is_well_and_no_more():
     with served(invitations=Invitations(0.0)) as serving:
         request = urllib.request.Request(f"http://127.0.0.1:{serving.port}/health")
         with urllib.request.urlopen(request, timeout=5) as answer:
@@ -83,7 +83,7 @@ def test_without_a_token_health_says_whether_all_is_well_and_no_more():
             assert json.load(answer)["robot"] == "puma560"
 
 
-def test_other_hosts_other_pages_and_other_protocols_are_refused():
+def test_t06_other_hosts_other_pages_and_other_protocols_are_refused():
     async def refused(serving, **options):
         with pytest.raises(InvalidStatus) as caught:
             await connect(url(serving), compression=None, proxy=None, **options)
@@ -151,7 +151,7 @@ def stuck(serving):
     return connection
 
 
-def test_who_reads_nothing_is_cut_off_and_the_others_get_their_frames():
+def test_t11_who_reads_nothing_is_cut_off_and_the_others_get_their_frames():
     async def talk(serving):
         connection = await greeted(serving)
         await connection.send(encode(Follow(1, ViewForm.FRAMES, 60.0), Encoding.MSGPACK))

@@ -139,7 +139,7 @@ def test_who_had_control_has_a_place_when_all_are_taken():
 
 
 @BOTH
-def test_rubbish_is_answered_executes_nothing_and_ends_by_closing(encoding):
+def test_t09_rubbish_is_answered_executes_nothing_and_ends_by_closing(encoding):
     hub = make_hub()
     peer, other = Peer(hub, encoding=encoding), Peer(hub)
     before = hub.site.engine.timeline
@@ -235,7 +235,7 @@ def test_an_order_is_carried_out_once_however_often_it_comes():
     assert hub.site.engine.newest == 1
 
 
-def test_a_replay_by_somebody_else_executes_nothing():
+def test_t08_a_replay_by_somebody_else_executes_nothing():
     hub = make_hub()
     peer, epoch = holder(hub)
     thief = Peer(hub)
@@ -246,7 +246,7 @@ def test_a_replay_by_somebody_else_executes_nothing():
 
 
 @pytest.mark.parametrize("wrong", [0, 2**63, -1])
-def test_only_the_epoch_in_force_counts(wrong):
+def test_t07_only_the_epoch_in_force_counts(wrong):
     hub = make_hub(epoch=2**62)
     peer, epoch = holder(hub)
     outcome = peer.tell(Order(1, to(1), max(epoch + wrong, 0) if wrong < 0 else wrong), now=0.1)[0]

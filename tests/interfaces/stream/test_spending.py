@@ -195,7 +195,7 @@ def test_no_way_that_is_taken_ever_fails_and_others_say_what_is_allowed() -> Non
     assert decode(encode(Survey(1), Encoding.JSON), Encoding.JSON, allowed=Survey, largest=LARGEST) == Survey(1)
 
 
-def test_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
+def test_t11_viewers_at_all_they_may_spend_dont_hold_up_who_commands() -> None:
     """By sockets alone; the bar is wide, for other tests share the processor."""
 
     async def viewer(url: str, stop: asyncio.Event, edit: int) -> int:

@@ -15,6 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from interfaces.stream.access import Admission
 from interfaces.stream.meshcat import Committed, TwinScene
 from interfaces.stream.meshcat.meshes import bodies
 from interfaces.stream.meshcat.page import BATCHES, PATIENCE, UNAUTHORISED, routes
@@ -213,7 +214,9 @@ def test_the_page_connects_again_by_itself(made: TwinScene, open_page: Any) -> N
 
 
 def test_a_token_is_asked_for_where_one_is_needed(made: TwinScene, open_page: Any) -> None:
-    with served(routes(made, authorize=lambda token: token == "right")) as server:
+    with served(
+        routes(made, authorize=lambda _, token: Admission("" if token == "right" else "another one"))
+    ) as server:
         page = open_page(server, live=False)
         page.wait_for_selector("#enter:not([hidden])")
         assert page.locator("#refused").is_hidden()

@@ -16,6 +16,7 @@ import pytest
 
 from interfaces.messages.control import Role
 from interfaces.stream import sockets
+from interfaces.stream.access import Access, Admission
 from interfaces.val2.controller import Controller
 from interfaces.val2.monitor.control import Control, SharedController
 from interfaces.val2.monitor.files import Files
@@ -92,11 +93,11 @@ CLIENTS = []
 """To be closed in the end."""
 
 
-class Tokens:
+class Tokens(Access):
     """What tokens open."""
 
-    def refusal(self, role, token):
-        return "" if token == "secret" or (token == "look" and role is Role.VIEWER) else "no"
+    def admit(self, role, token):
+        return Admission("" if token == "secret" or (token == "look" and role is Role.VIEWER) else "no")
 
 
 class Client:
@@ -305,7 +306,7 @@ FOREIGN = {
 
 @pytest.mark.parametrize("size", [1, 1000])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_http_or_tls_is_hung_up_on_and_moves_nothing(tmp_path, kind, size):
+def test_t06_what_is_http_or_tls_is_hung_up_on_and_moves_nothing(tmp_path, kind, size):
     """Whatever it says next: the lines of its body, even the right token."""
 
     async def scenario():
