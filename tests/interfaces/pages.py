@@ -24,4 +24,4 @@ def wait(page: Any, expression: str, arg: Any = None) -> None:
 def accessible(page: Any, within: str | None = None) -> None:
     """Find no fault that axe finds in a page, or within an element of it."""
     found = Axe().run(page, context=within)["violations"]
-    assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in found] == []
+    assert not found, [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in found]

@@ -175,7 +175,7 @@ function View({ replay, k, item }) {
     <div class="labels" aria-hidden="true" ref=${labels}></div>
     <p class="no-3d" ref=${without} hidden>No 3D view: this browser offers no WebGL. Play-back works all the same.</p>
     <div class="card left">
-      <p class="name" title=${[item.title, `delay ${item.delay}`, item.driver].filter(Boolean).join(" · ")}>${replay.letter(k)}${item.name}</p>
+      <h1 class="name" title=${[item.title, `delay ${item.delay}`, item.driver].filter(Boolean).join(" · ")}>${replay.letter(k)}${item.name}</h1>
       <ul class="legend">${LEGEND.map(([path, text, more]) => html`<li hidden=${OWN.includes(path) && !item.shows.includes(path)}>
         <button type="button" aria-pressed="true" data-path=${path} onClick=${(event) => toggle(event, path)}>
           <i class=${`key key-${path}`}></i>${text}<span>${more}</span></button></li>`)}</ul>
