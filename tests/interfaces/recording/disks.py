@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import time
+from pathlib import Path
 from threading import Event
 
 
@@ -64,3 +66,22 @@ class Hanging(Disk):
             self.hangs.set()
             self.free.wait(30.0)
         return super().take(data)
+
+
+class Filling:
+    """A file that has room for so many bytes."""
+
+    def __init__(self, path: Path, room: int) -> None:
+        self.file, self.room = path.open("wb", buffering=0), room
+        self.full = 0.0
+        """When it took less than it was given, by the machine's monotonic counter [s]; 0 before."""
+
+    def write(self, data: bytes | memoryview, /) -> int | None:
+        some = bytes(data)[: self.room]
+        self.room -= len(some)
+        if len(some) < len(data):
+            self.full = self.full or time.monotonic()
+        return self.file.write(some)
+
+    def close(self) -> None:
+        self.file.close()
