@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,6 +43,10 @@ SCENARIOS = {
     "2,048 idle sockets": "idle",
     "4,000 connections a second": "connections",
     "a flooded VAL-II port": "terminals",
+    "64 that ask for frames and read none": "stalled",
+    "256 that drip": "dripping",
+    "8 viewers that flood": "flooding viewers",
+    "8 operators that flood": "flooding operators",
 }
 
 
@@ -77,14 +81,14 @@ def served(directory: Path) -> Iterator[Ports]:
 
 
 @contextlib.asynccontextmanager
-async def load(kind: str, ports: Ports) -> AsyncIterator[list[str]]:
-    """Put a load on, nothing where its name is empty; how much it was is in the list afterwards."""
+async def load(kind: str, ports: Ports, seconds: float) -> AsyncIterator[list[str]]:
+    """Put a load on for a time [s], nothing where its name is empty; how much it was is in the list afterwards."""
     found: list[str] = []
     if not kind:
         yield found
         return
     port = ports.val if kind == "terminals" else ports.page
-    command = [sys.executable, str(LOADS), kind, str(port), str(SECONDS + BACK + 8.0), ports.token]
+    command = [sys.executable, str(LOADS), kind, str(port), str(seconds + BACK + 8.0), ports.token]
     pipe = subprocess.PIPE
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
     try:
@@ -222,18 +226,18 @@ class Operator:
         return await Operator.join(self.port), time.monotonic() - begun
 
 
-async def _measure(ports: Ports) -> list[Result]:
+async def _measure(ports: Ports, names: Iterable[str], seconds: float) -> list[Result]:
     results: list[Result] = []
-    for name, kind in SCENARIOS.items():
+    for name in names:
         operator = await Operator.join(ports.page)
         await operator.ready()
         enough = asyncio.Event()
         steering = asyncio.create_task(operator.steer(enough))
         await asyncio.sleep(1.0)
         operator.halted.clear()
-        async with load(kind, ports) as load_was:
+        async with load(SCENARIOS[name], ports, seconds) as load_was:
             operator.took.clear()
-            await asyncio.sleep(SECONDS)
+            await asyncio.sleep(seconds)
             enough.set()
             await steering
             took = np.array(operator.took) * 1e3
@@ -253,15 +257,19 @@ async def _measure(ports: Ports) -> list[Result]:
     return results
 
 
-def part() -> Part:
-    """Measure."""
+def results(names: Iterable[str], seconds: float) -> list[Result]:
+    """A command's round trip, halts and the way back, under some of the scenarios, each for a time [s]."""
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder)
         (directory / LOADED).write_text(
             ".PROGRAM flood()\n" + "  x = x + 1\n" * 80_000 + ".END\n", encoding="ascii"
         )
         with served(directory) as ports:
-            results = asyncio.run(_measure(ports))
+            return asyncio.run(_measure(ports, names, seconds))
+
+
+def part() -> Part:
+    """Measure."""
     return Part(
         "Availability",
         f"`vrs serve` and its robot, and an operator who steers every {1000 * PERIOD:g} ms for {SECONDS:g} s by a "
@@ -269,7 +277,8 @@ def part() -> Part:
         "own on the same machine, one after the other: viewers at nine tenths of the messages they may send, most "
         "of them for edits; sockets that say nothing, half a request or no hello, opened again where they were "
         "closed; connections that come and go; a terminal that sends lines and loads a program of a megabyte as "
-        "fast as it's let, beside others without a token. Under each the operator's connection is lost, and comes "
-        "back with its session.",
-        tuple(results),
+        "fast as it's let, beside others without a token; clients that read nothing or send a byte now and then; "
+        "clients of each role that send all that they can, and come again when they're cut off. Under each the "
+        "operator's connection is lost, and comes back with its session.",
+        tuple(results(SCENARIOS, SECONDS)),
     )
