@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,12 @@ from typing import NamedTuple
 
 import pytest
 
+from robots.rooms import read_room
+from tests.fault_suite.__main__ import INTRO, PAGE
+from tests.fault_suite.coverage import Coverage
 from tests.fault_suite.rows import ROWS
 from tests.faults import HOME, copied
+from vrs.errors import FormatError
 
 SMALL = "--tries", "2", "--seconds", "2", "--load", "4", "--hours", "0.1"
 
