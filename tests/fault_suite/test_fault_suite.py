@@ -116,12 +116,12 @@ PLANTED = {
     ),
     "models_in_toml_fuzzed": Planted(
         "robots/description/numbers.py",
-        "except (msgspec.DecodeError, RecursionError)",
+        "except (msgspec.DecodeError, ValueError, RecursionError)",
         "except (msgspec.ValidationError, RecursionError)",
     ),
     "things_to_grasp_fuzzed": Planted(
         "robots/things.py",
-        "except (msgspec.DecodeError, RecursionError)",
+        "except (msgspec.DecodeError, ValueError, RecursionError)",
         "except (msgspec.ValidationError, RecursionError)",
     ),
     "paths_fuzzed": Planted(
