@@ -12,6 +12,8 @@ from pathlib import Path
 from random import Random
 from unittest.mock import patch
 
+import numpy as np
+
 from benchmarks.results import Result
 from interfaces.jobs import JobFile
 from interfaces.messages.control import Role
@@ -54,19 +56,20 @@ def recording_cut_short(effort: Effort) -> tuple[Result, ...]:
 def recording_full(effort: Effort) -> tuple[Result, ...]:
     """The disk fills up while a live site is recorded
 
-    Both sites live, and a disk with room for some 3 to 60 kB. From the first write that it cuts short it's measured
-    until `/health` says it; then the arm is commanded.
+    Both sites live, and a disk that has room for up to 20 kB more. From the first write that it cuts short it's
+    measured until `/health` says it; then the arm is commanded.
     """
-    tries: Tries[tuple[float, bool, bool]] = Tries(effort, 3_000, 60_000)
+    tries: Tries[tuple[float, bool, bool]] = Tries(effort, 0, 20_000)
 
     async def session(path: Path) -> None:
         async with robot_here() as (_, url):
             for room in tries:
-                disk = Filling(path, round(room))
+                disk = Filling(path, 10**9)
                 with patch.object(
                     Sink, "create", classmethod(lambda cls, path, disk=disk, **_: cls(disk, str(path)))
                 ):
                     async with test_live.recorded(url, path, []) as live:
+                        disk.room = round(room)
                         await until(lambda disk=disk: disk.full)
                         await until(lambda live=live: live.health()["recording"]["problem"])
                         told = time.monotonic() - disk.full
@@ -88,18 +91,20 @@ def recording_full(effort: Effort) -> tuple[Result, ...]:
 def recording_slow(effort: Effort) -> tuple[Result, ...]:
     """The disk hangs while a live site is recorded
 
-    As above with a disk that takes nothing for a while at its third block, and then goes on.
+    As above with a disk that takes nothing for a while, and then goes on.
     """
     tries: Tries[tuple[float, bool]] = Tries(effort)
 
     async def session() -> None:
         async with robot_here() as (_, url):
             for _ in tries:
-                disk = Hanging()
+                disk = Hanging(np.inf)
                 with patch.object(
                     Sink, "create", classmethod(lambda cls, path, disk=disk, **_: cls(disk, str(path)))
                 ):
                     async with test_live.recorded(url, Path("nowhere.mcap"), []) as live:
+                        assert not live.health()["recording"]["problem"]
+                        disk.after = disk.calls
                         await until(disk.hangs.is_set)
                         hung = time.monotonic()
                         await until(lambda live=live: live.health()["recording"]["problem"])

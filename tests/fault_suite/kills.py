@@ -362,8 +362,7 @@ def camera_killed(effort: Effort) -> tuple[Result, ...]:
     be told, there are pictures again soon, and the robot takes orders meanwhile.
     """
     tries: Tries[tuple[float, float, bool]] = Tries(effort)
-    with serving("--robot", "ipr") as (process, url), _page(url) as page:
-        page.until(lambda m: m["type"] == "postures" and not m.get("halted") and m.get("connected", True))
+    with serving("--robot", "ipr") as (process, url):
         for instant in tries:
             assert soon(lambda: _picture(url))
             end = time.monotonic() + instant
@@ -375,8 +374,12 @@ def camera_killed(effort: Effort) -> tuple[Result, ...]:
                 picture = looking.submit(soon, lambda: _picture(url))
                 soon(lambda: "gives no pictures" in str(health(url)[1]))
                 told = time.monotonic() - died
-                page.order(type="drive", v=0.1, w=0.0, duration=0.1)
-                outcome = page.until(lambda m: m["type"] == "outcome" and m["number"] == page.orders)
+                with _page(url) as page:
+                    page.until(
+                        lambda m: m["type"] == "postures" and not m.get("halted") and m.get("connected", True)
+                    )
+                    page.order(type="drive", v=0.1, w=0.0, duration=0.1)
+                    outcome = page.until(lambda m: m["type"] == "outcome")
                 picture.result()
             refused = bool(outcome.get("refusal")) or (outcome.get("receipt") or {}).get("status") == "rejected"
             tries.take((told, time.monotonic() - died, refused), sound=told <= TOLD)

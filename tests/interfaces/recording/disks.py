@@ -55,14 +55,15 @@ class Failing(Disk):
 
 
 class Hanging(Disk):
-    """Hangs from the second block on, until it's let go."""
+    """Hangs after so many writes, until it's let go."""
 
-    def __init__(self) -> None:
+    def __init__(self, after: float = 2) -> None:
         super().__init__()
+        self.after = after
         self.hangs, self.free = Event(), Event()
 
     def take(self, data: bytes | memoryview) -> int | None:
-        if self.calls > 2:
+        if self.calls > self.after:
             self.hangs.set()
             self.free.wait(30.0)
         return super().take(data)
