@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import machine
+from benchmarks.page import VERDICTS
 from tests.fault_suite.effort import Effort
 from tests.fault_suite.rows import ROWS, tried
 
 HOME = Path(__file__).resolve().parents[2]
 PAGE = HOME / "docs" / "faults.md"
 DATA = "faults.json"
+NO = VERDICTS[False]
 HEAD = ("fault", "tries", "promised", "seen", "holds")
 INTRO = """# Faults, and what was seen
 
@@ -45,7 +47,8 @@ def run(name: str, effort: Effort) -> dict[str, Any]:
 def lines(found: dict[str, Any]) -> list[str]:
     """The lines of a row in the table: its title, and its figures."""
     if "failed" in found:
-        return [_line(f"**{found['title']}**", "", "", found["failed"].replace("|", "\\|"), "**no**")]
+        verdict = NO if "commit" in found else ""
+        return [_line(f"**{found['title']}**", "", "", found["failed"].replace("|", "\\|"), verdict)]
     rows = [_line(f"**{found['title']}**", "", "", "", "")]
     for one in found["results"]:
         tries = "" if one["tries"] is None else f"{one['tries']:,}"
@@ -64,18 +67,17 @@ def page(rows: dict[str, Any]) -> str:
     for name, row in ROWS.items():
         found = rows.get(name, {"title": row.title, "failed": "not run yet"})
         table += lines(found)
-        effort = " ".join(f"--{key} {value:g}" for key, value in found.get("effort", {}).items())
+        effort = " ".join(f"--{key} {found['effort'][key]:g}" for key in row.effort if "effort" in found)
         notes = "; ".join(one["note"] for one in found.get("results", ()) if one["note"])
-        how += [
-            f"### {row.title}",
-            row.text,
-            "",
-            f"`--only {name}`: {effort}, {found.get('took', 0):.0f} s. {notes}",
-            "",
-        ]
+        much = f"{effort}; {found.get('took', 0):.0f} s, the machine's load {found.get('load', '')}. {notes}"
+        how += [f"### {row.title}", row.text, "", f"`--only {name}`: {much}", ""]
     held = [one["holds"] == "yes" for found in rows.values() for one in found.get("results", ())]
+    unsaid = sum(one["holds"] == "can't say" for found in rows.values() for one in found.get("results", ()))
     failed = [found["title"] for found in rows.values() if "failed" in found]
     summary = f"**{sum(held)} of {len(held)} figures hold.**" + "".join(f" Failed: {title}." for title in failed)
+    summary += f" Of {unsaid} the run can't say, as others kept the machine busy." * bool(unsaid)
+    late = [row.title for name, row in ROWS.items() if name not in rows]
+    summary += f" Not run yet: {'; '.join(late)}." * bool(late)
     commits = ", ".join(sorted({found["commit"] for found in rows.values()}))
     return (
         "\n".join([INTRO, summary, f"Run at {commits}.", "", *table, "", "## How each is tried", *how]).rstrip()
@@ -103,7 +105,7 @@ def main(words: list[str]) -> int:
     for name in () if docs else only or ROWS:
         rows[name] = found = run(name, effort)
         print("\n".join(lines(found)), flush=True)  # noqa: T201
-        missed += "failed" in found or any(one["holds"] != "yes" for one in found["results"])
+        missed += "failed" in found or any(one["holds"] == NO for one in found["results"])
         data.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         (out / "faults.md").write_text(page(rows), encoding="utf-8")
     if docs:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,12 +25,14 @@ class Row:
     """How it's tried."""
     figures: Callable[[Effort], tuple[Result, ...]]
     """What was promised and what was seen."""
+    effort: tuple[str, ...]
+    """What of the effort counts."""
 
 
-def _of(figures: Callable[[Effort], tuple[Result, ...]]) -> Row:
+def _of(figures: Callable[[Effort], tuple[Result, ...]], *effort: str) -> Row:
     """A row whose function's docstring says what it is."""
     title, _, text = inspect.getdoc(figures).partition("\n\n")  # type: ignore[union-attr]
-    return Row(title, " ".join(text.split()), figures)
+    return Row(title, " ".join(text.split()), figures, effort)
 
 
 _FUNCTIONS = (
@@ -38,7 +40,6 @@ _FUNCTIONS = (
     kills.robot_stopped, kills.body_killed, kills.body_stopped, kills.camera_killed, kills.recorder_killed,
     disks.recording_cut_short, disks.recording_full, disks.recording_slow, disks.files_full, disks.audit_full,
     clocks.clock_steps_and_drifts, clocks.calendar_steps,
-    parsers.wire_fuzzed, parsers.rsp_fuzzed, parsers.recordings_flipped,
 )  # fmt: skip
 _FUZZED = (
     "Mutated by bytes, numbers and lines; what reaches a new block of the parser, or is refused for a new reason, "
@@ -51,14 +52,25 @@ def _word(name: str) -> str:
     return "_".join("".join(c if c.isalnum() else " " for c in name.lower()).split())
 
 
-ROWS = {
-    **{figures.__name__: _of(figures) for figures in _FUNCTIONS},
-    **{f"{_word(name)}_fuzzed": Row(f"{name[0].upper()}{name[1:]} that are damaged", _FUZZED,
-                                    partial(parsers.parser_fuzzed, name)) for name in parsers.PARSERS},
-    **{f"load_{_word(kind)}": Row(name[0].upper() + name[1:], _LOADED, partial(loads.under_load, name))
-       for name, kind in availability.SCENARIOS.items() if kind},
-    "day_of_faults": _of(day.day_of_faults),
-}  # fmt: skip
+_BY_TIME = parsers.wire_fuzzed, parsers.rsp_fuzzed, parsers.recordings_flipped
+
+
+def _rows() -> Iterator[tuple[str, Row]]:
+    for figures in _FUNCTIONS:
+        yield figures.__name__, _of(figures, "tries", "seed")
+    for figures in _BY_TIME:
+        yield figures.__name__, _of(figures, "seconds", "seed")
+    for name in parsers.PARSERS:
+        title, fuzzed = f"{name[0].upper()}{name[1:]} that are damaged", partial(parsers.parser_fuzzed, name)
+        yield f"{_word(name)}_fuzzed", Row(title, _FUZZED, fuzzed, ("seconds", "seed"))
+    for name, kind in availability.SCENARIOS.items():
+        if kind:
+            loaded = partial(loads.under_load, name)
+            yield f"load_{_word(kind)}", Row(f"{name[0].upper()}{name[1:]}", _LOADED, loaded, ("load",))
+    yield "day_of_faults", _of(day.day_of_faults, "hours", "seed")
+
+
+ROWS = dict(_rows())
 
 
 def tried(name: str, effort: Effort) -> dict[str, Any]:
@@ -69,7 +81,6 @@ def tried(name: str, effort: Effort) -> dict[str, Any]:
 
 
 def _fact(result: Result) -> dict[str, Any]:
-    assert result.ours is not None
-    return {"name": result.name, "tries": result.tries, "promised": result.asked,
-            "seen": f"{number(result.ours.median)} {result.unit}".rstrip(), "holds": verdict(result),
-            "note": result.note}  # fmt: skip
+    seen = "" if result.ours is None else f"{number(result.ours.median)} {result.unit}".rstrip()
+    return {"name": result.name, "tries": result.tries, "promised": result.asked, "seen": seen,
+            "holds": verdict(result), "note": result.note}  # fmt: skip

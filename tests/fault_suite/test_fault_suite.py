@@ -59,9 +59,7 @@ PLANTED = {
         "self._flush, self._room = 60.0, room",
     ),
     "recording_cut_short": Planted(
-        "interfaces/recording/mcap_file.py",
-        "            if not taken:",
-        "            if False:",
+        "interfaces/recording/mcap_file.py", "rest = rest[taken:]", "rest = rest[len(rest) :]"
     ),
     "recording_full": Planted(
         "interfaces/recording/recorder.py",
