@@ -53,11 +53,7 @@ PLANTED = {
     "body_killed": Planted("interfaces/runtime/live/process.py", '    ended(f"the robot', '    str(f"the robot'),
     "body_stopped": Planted("interfaces/runtime/physics.py", "events.append(Silent(self._heard))", "pass"),
     "camera_killed": Planted("interfaces/media/camera.py", "self.problem = str(error)", 'self.problem = ""'),
-    "recorder_killed": Planted(
-        "interfaces/recording/recorder.py",
-        "self._flush, self._room = flush, room",
-        "self._flush, self._room = 60.0, room",
-    ),
+    "recorder_killed": Planted("interfaces/recording/writer.py", "FLUSH = 0.25", "FLUSH = 60.0"),
     "recording_cut_short": Planted(
         "interfaces/recording/mcap_file.py", "rest = rest[taken:]", "rest = rest[len(rest) :]"
     ),
