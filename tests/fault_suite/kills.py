@@ -12,7 +12,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AsyncExitStack, contextmanager
+from contextlib import AsyncExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -141,16 +141,20 @@ async def _clients_lost(effort: Effort, number: int) -> tuple[Result, ...]:
                 sys.executable, str(Path(live_rig.__file__).with_name("killer.py")), at, "0", str(instant),
                 str(number), stdout=asyncio.subprocess.PIPE,
             )  # fmt: skip
-            assert killer.stdout is not None
-            _, when = (await killer.stdout.readline()).split()
-            await until(lambda: operator.hub.lease_state is LeaseState.FREE, 30.0)
-            ended = time.monotonic() - float(when)
-            stood = 1e3 * (robot.clock.now() + LEAD + 0.05)
-            await asyncio.sleep(1.0)
-            if number == signal.SIGSTOP:
-                killer.send_signal(signal.SIGCONT)
-                await asyncio.sleep(1.5)
-            await killer.wait()
+            try:
+                assert killer.stdout is not None
+                _, when = (await killer.stdout.readline()).split()
+                await until(lambda: operator.hub.lease_state is LeaseState.FREE, 30.0)
+                ended = time.monotonic() - float(when)
+                stood = 1e3 * (robot.clock.now() + LEAD + 0.05)
+                await asyncio.sleep(1.0)
+                if number == signal.SIGSTOP:
+                    killer.send_signal(signal.SIGCONT)
+                    await asyncio.sleep(1.5)
+                await killer.wait()
+            finally:
+                with suppress(ProcessLookupError):
+                    killer.kill()
             ticks, asked = rows.until(round(1e3 * robot.clock.now()))
             moved = float(np.ptp(asked[ticks >= stood, :6], axis=0).max())
             tries.take((ended, moved), sound=ended <= 2.0 + BRAKE + TOLD)
