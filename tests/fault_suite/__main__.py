@@ -78,7 +78,7 @@ def page(rows: dict[str, Any]) -> str:
     summary += f" Of {unsaid} the run can't say, as others kept the machine busy." * bool(unsaid)
     late = [row.title for name, row in ROWS.items() if name not in rows]
     summary += f" Not run yet: {'; '.join(late)}." * bool(late)
-    commits = ", ".join(sorted({found["commit"] for found in rows.values()}))
+    commits = ", ".join(sorted({found["commit"].split()[0] for found in rows.values()}))
     return (
         "\n".join([INTRO, summary, f"Run at {commits}.", "", *table, "", "## How each is tried", *how]).rstrip()
         + "\n"
