@@ -57,11 +57,7 @@ PLANTED = {
     "recording_cut_short": Planted(
         "interfaces/recording/mcap_file.py", "rest = rest[taken:]", "rest = rest[len(rest) :]"
     ),
-    "recording_full": Planted(
-        "interfaces/recording/recorder.py",
-        "        if self._failed:\n            return self._failed",
-        "        if 0: return ''",
-    ),
+    "recording_full": Planted("interfaces/recording/live.py", '"problem": self.problem', '"problem": None'),
     "recording_slow": Planted("interfaces/recording/recorder.py", "STALLED = 0.75", "STALLED = 5.0"),
     "files_full": Planted("interfaces/system.py", 'path.with_name(f".{path.name}.{secrets.token_hex(4)}")', "path"),
     "audit_full": Planted("interfaces/stream/audit.py", "os.ftruncate(self._file, size)", "pass"),
