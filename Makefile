@@ -10,7 +10,8 @@ export PYTHONDONTWRITEBYTECODE :=
 # Everything by its hash; see there.
 INSTALL := $(PY) .ci/install.py -e .
 
-.PHONY: demo test slow without contract platforms hashes generate lint types docs docs-check bench reproduce soak wheel clean
+.PHONY: demo test slow without contract platforms hashes generate lint types docs docs-check bench reproduce soak faults
+.PHONY: wheel clean
 
 demo: $(STAMP)
 	.venv/bin/vrs demo
@@ -102,6 +103,11 @@ soak: $(DEV_STAMP)
 	$(PY) -m tests.vrs.test_soak
 	$(PY) -m pytest tests/vrs/test_machine.py
 	VRS_SOAK_PACKETS=100000 VRS_SOAK_DATAGRAMS=500000 $(PY) -m pytest tests/interfaces/rsp/test_exchange.py tests/interfaces/rsp/test_fuzz.py
+
+# Every fault: processes killed, disks full, clocks that step, parsers fuzzed, floods, a day of virtual operation. Writes
+# out/faults; takes some nine hours, `$(PY) -m tests.fault_suite --only ROW --tries N` less.
+faults: $(DEV_STAMP)
+	$(PY) -m tests.fault_suite
 
 # The wheel, in an empty environment outside the checkout, does the main job; what that is made of: out/sbom.json.
 wheel: $(DEV_STAMP)

@@ -40,6 +40,14 @@ LINGERING = 64
 """So many of them are open at once."""
 TERMINALS = 64
 """Sockets at the VAL-II port that show no token."""
+FLOODERS = 8
+"""Clients that send as fast as they can, and come again when they're cut off."""
+STALLED = 64
+"""Clients that ask for frames and read none."""
+DRIPPING = 256
+"""Sockets that send a byte of something now and then."""
+DRIP = 0.05
+"""Time between two bytes of each [s]."""
 LOADED = "flood.v2"
 """A program of a megabyte, in the server's directory."""
 _TICK = 0.02
@@ -107,6 +115,94 @@ async def view(port: int, seconds: float, tls: ssl.SSLContext | None) -> None:
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _flood(port: int, role: str, flooder: int, sent: list[int], told: set[int]) -> None:
+    """One client that sends more than it may, again and again; it notes whether it was told so."""
+    text = json.dumps({"type": "order", "number": 1, "epoch": "1", "command": {"type": "stop"}})
+    if role == "viewer":
+        text = json.dumps({"type": "want", "edit": 0})
+
+    async def read(peer: ClientConnection) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            async for said in peer:
+                if "too-fast" in str(said)[:200]:
+                    told.add(flooder)
+
+    while True:
+        with contextlib.suppress(ConnectionClosed, OSError):
+            async with connect(
+                f"ws://{HERE}:{port}/ws", subprotocols=[Subprotocol("vrs.1.json")], proxy=None, close_timeout=0.2
+            ) as peer:
+                await peer.send(f'{{"type":"hello","protocol":1,"role":"{role}","name":"flood"}}')
+                reading = asyncio.create_task(read(peer))
+                while not reading.done():
+                    for _ in range(100):
+                        await peer.send(text)
+                        sent[flooder] += 1
+                    await asyncio.sleep(0)
+        await asyncio.sleep(0.1)
+
+
+async def flood(port: int, seconds: float, role: str) -> None:
+    """Clients of a role that send as fast as they're let."""
+    until = time.monotonic() + seconds
+    sent, told = FLOODERS * [0], set[int]()
+    tasks = [asyncio.create_task(_flood(port, role, flooder, sent, told)) for flooder in range(FLOODERS)]
+    await asyncio.sleep(0.5)
+    on()
+    begun = time.monotonic()
+    while time.monotonic() < until and not ended():
+        await asyncio.sleep(0.1)
+    passed = time.monotonic() - begun
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    print(f"{sum(sent) / passed:.0f} messages a second, {FLOODERS - len(told)} flooders weren't told", flush=True)
+
+
+async def stall(port: int, seconds: float) -> None:
+    """Clients that ask for frames and read none: their sockets have room for little."""
+    until = time.monotonic() + seconds
+    async with contextlib.AsyncExitStack() as stack:
+        for _ in range(STALLED):
+            narrow = socket.socket()
+            narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            narrow.connect((HERE, port))
+            narrow.setblocking(False)
+            peer = await stack.enter_async_context(
+                connect(f"ws://{HERE}:{port}/ws", sock=narrow, subprotocols=[Subprotocol("vrs.1.json")], proxy=None,
+                        max_queue=1, close_timeout=0.1, ping_interval=None)
+            )  # fmt: skip
+            await peer.send('{"type":"hello","protocol":1,"role":"viewer","name":"stalls"}')
+            await peer.send('{"type":"follow","number":1,"form":"frames","rate":60}')
+        on()
+        while time.monotonic() < until and not ended():
+            await asyncio.sleep(0.1)
+        print(f"{STALLED} that read nothing", flush=True)
+
+
+def drip(port: int, seconds: float) -> None:
+    """Sockets that send a byte of a header, of a body or of a frame now and then; opened again where closed."""
+    until, opened = time.monotonic() + seconds, 0
+    peers = [_idle(port, number) for number in range(DRIPPING)]
+    on()
+    while time.monotonic() < until and not ended():
+        for number, peer in enumerate(peers):
+            try:
+                peer.send(b"x")
+                closed = _is_closed(peer)
+            except OSError:
+                closed = True
+            if closed:
+                peer.close()
+                with contextlib.suppress(OSError):
+                    peers[number] = _idle(port, number)
+                opened += 1
+        time.sleep(DRIP)
+    for peer in peers:
+        peer.close()
+    print(f"{DRIPPING} that drip, {opened} opened again", flush=True)
 
 
 def _idle(port: int, number: int) -> socket.socket:
@@ -231,6 +327,10 @@ def main(words: list[str]) -> None:
     loads: dict[str, Callable[[], None]] = {
         "viewers": lambda: asyncio.run(view(port, seconds, tls)),
         "idle": lambda: idle(port, seconds),
+        "stalled": lambda: asyncio.run(stall(port, seconds)),
+        "dripping": lambda: drip(port, seconds),
+        "flooding viewers": lambda: asyncio.run(flood(port, seconds, "viewer")),
+        "flooding operators": lambda: asyncio.run(flood(port, seconds, "operator")),
         "connections": lambda: come_and_go(port, seconds, CONNECTIONS, (b"G", b"GET / HTTP/1.1\r\nHost")),
         "handshakes": lambda: come_and_go(port, seconds, HANDSHAKES, 2 * (first_message(),), LINGERING),
         "terminals": lambda: type_on(port, seconds, words[3]),

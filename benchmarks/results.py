@@ -71,6 +71,8 @@ class Result:
     ratio: float | None = None
     """The peer's median over ours, from blocks that took turns: above 1, ours is the faster."""
     note: str = ""
+    tries: int | None = None
+    """How often it was tried, of what happens or doesn't; None of what is measured."""
 
     @property
     def asked(self) -> str:

@@ -171,5 +171,5 @@ def read_scene(path: Path) -> Scene:
         return decode(text, type=Scene)
     except OSError as error:
         raise FormatError(str(path), error.strerror or str(error)) from None
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise FormatError(str(path), str(error)) from None

@@ -31,6 +31,7 @@ ELSEWHERE: Final = {
     "make contract": "by hand; make test and make slow have it",
     "python -m tests.contract.golden": "by hand, where results are to change",
     "make soak": "by hand; tests/vrs/test_soak.py has it in small",
+    "make faults": "by hand, some nine hours; tests/fault_suite/test_fault_suite.py has every row in small",
     "make docs": "by hand, and tests/test_docs.py checks links and anchors",
     "make docs-check": "itself",
     "docker": "where there's Docker; tests/test_container.py reads the Dockerfile",

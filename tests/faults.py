@@ -143,6 +143,15 @@ def seen(tree: Path, fault: Fault, workers: int) -> str | None:
     return None
 
 
+def copied(folder: Path) -> Path:
+    """A copy of the project in a folder, in which a fault may be planted."""
+    tree = folder / "tree"
+    ignored = shutil.ignore_patterns(".git", ".venv", "out", ".*_cache", "__pycache__")
+    shutil.copytree(HOME, tree, ignore=ignored)
+    (tree / ".venv").symlink_to(HOME / ".venv")
+    return tree
+
+
 def _first_failure(tree: Path, tests: list[str], workers: int, without: list[str]) -> str | None:
     """Return what fails first, or how the run ended otherwise; None where all pass."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-n", str(workers), *tests]
@@ -173,10 +182,7 @@ def main() -> int:
     sizes = [len((HOME / path).read_text(encoding="utf-8").split("\n")) for path in paths]
     missed = 0
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder) / "tree"
-        ignored = shutil.ignore_patterns(".git", ".venv", "out", ".*_cache", "__pycache__")
-        shutil.copytree(HOME, tree, ignore=ignored)
-        (tree / ".venv").symlink_to(HOME / ".venv")
+        tree = copied(Path(folder))
         count = 0
         while count < options.count:
             fault = plant(rng.choices(paths, sizes)[0], rng)

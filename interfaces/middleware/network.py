@@ -148,7 +148,7 @@ def read_network(text: bytes | str, where: str = "network") -> GainNetwork:
     """
     try:
         found = msgspec.json.decode(text, type=GainNetwork)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         if isinstance(error.__cause__, InvalidValueError):
             raise FormatError(where, str(error.__cause__)) from None
         raise FormatError(where, f"isn't a gain network: {error}") from None

@@ -322,9 +322,13 @@ def make_tokens(path: Path, random_bytes: Callable[[int], bytes] = secrets.token
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except OSError as error:
         raise FormatError(f"token file {path}", error.strerror or "can't be made") from None
-    with open(descriptor, "w", encoding="ascii") as file:
-        path.chmod(0o600)
-        file.writelines(f"{role} {token}\n" for role, token in tokens.items())
+    try:
+        with written(path), open(descriptor, "w", encoding="ascii") as file:
+            path.chmod(0o600)
+            file.writelines(f"{role} {token}\n" for role, token in tokens.items())
+    except FormatError:
+        path.unlink()
+        raise
     return tokens
 
 

@@ -21,7 +21,7 @@ from typing import BinaryIO, Final, NamedTuple, TypeAlias
 
 from interfaces.stream.limits import Bucket
 from interfaces.system import lock
-from vrs.clock import seconds_since_1970
+from vrs.clock import WallClock, seconds_since_1970
 from vrs.errors import FormatError
 
 Fact: TypeAlias = str | int | float | bool | None
@@ -67,7 +67,8 @@ class AuditLog:
         """Why lines aren't written at present."""
         self.lost = 0
         """Lines that weren't written since then."""
-        self._allowed = Bucket(LINES, LINES_BURST, seconds_since_1970())
+        self._clock = WallClock()
+        self._allowed = Bucket(LINES, LINES_BURST, self._clock.now())
         self._counted: dict[tuple[tuple[str, Fact], ...], int] = {}
         self._due = float("inf")
         self._queue: queue.Queue[dict[str, Fact] | None] = queue.Queue(WAITING)
@@ -125,7 +126,7 @@ class AuditLog:
         Args:
             **facts: What, to whom and why.
         """
-        now, known = seconds_since_1970(), _known(facts)
+        now, known = self._clock.now(), _known(facts)
         kind = tuple(known.items())
         if kind not in self._counted and self._allowed.take(now):
             self.note("refused", **known)
@@ -143,7 +144,7 @@ class AuditLog:
 
     def advance(self) -> None:
         """Write what was counted, when it's time."""
-        if seconds_since_1970() >= self._due:
+        if self._clock.now() >= self._due:
             self._write_counted()
 
     def _write_counted(self) -> None:

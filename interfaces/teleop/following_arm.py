@@ -502,7 +502,9 @@ class RobotHost(Host[FollowingArm, Orders, Report]):
 
     @override
     def _left(self, now: float) -> None:
-        self._q = self.reference(np.array([now])).q[0]
+        # A stop near a limit may end beyond it by rounding, and no engine begins there.
+        limits = self._model.limits
+        self._q = np.clip(self.reference(np.array([now])).q[0], limits.q_min, limits.q_max)
         self._opening = float(self.openings(np.array([now]))[0])
 
     def openings(self, t: Array) -> Array:

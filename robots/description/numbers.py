@@ -159,7 +159,7 @@ def _read(path: Path, kind: type[_S]) -> _S:
         raise FormatError(str(path), f"can't be read: {error.strerror or error}") from None
     try:
         return msgspec.toml.decode(text, type=kind)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:
         said = str(error)
         if not isinstance(error, msgspec.ValidationError):
             raise FormatError(str(path), f"isn't TOML: {said}") from None

@@ -16,6 +16,7 @@ import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from ssl import SSLContext
 from typing import Any
 
@@ -130,6 +131,80 @@ async def until(ready: Callable[[], Any], timeout: float = 20.0) -> None:
     async with asyncio.timeout(timeout):
         while not ready():
             await asyncio.sleep(0.005)
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What a robot did that lost its operator in mid-motion; times from the loss on [s]."""
+
+    at: float
+    """The loss, by the robot's clock."""
+    said: str
+    """Why it halted."""
+    moved: bool
+    """Whether it moved as it lost him."""
+    halted: float
+    """When it decided to brake: its lead before it brakes."""
+    rested: float
+    """When it stood."""
+    excess: float
+    """Largest speed, and change of speed in a tick, of what the limits allow."""
+    went_on: float
+    """How far a joint went after it had stood [rad]."""
+    faults: int
+    """How often the body came to rest by itself."""
+
+
+async def lose_operator(
+    robot: LiveRobot, rows: Rows, url: str, wait: float, number: int = signal.SIGKILL, *options: str
+) -> Lost:
+    """Let an operator's site of its own command a robot here, and kill or stop it in mid-motion.
+
+    Args:
+        robot: In this loop.
+        rows: What its body is given.
+        url: Of the robot's site.
+        wait: From the last command to the signal [s].
+        number: The signal. Who is stopped goes on after 1.5 s, with what it was sent meanwhile.
+        options: More of `vrs serve`.
+    """
+    address = url.removeprefix("ws://").removesuffix("/site")
+    async with child_beside("serve", "--port", "0", "--robot-at", address, *options) as server:
+        # In a process of its own, so that it takes nothing of the robot's time.
+        killer = await asyncio.create_subprocess_exec(
+            sys.executable, str(Path(__file__).with_name("killer.py")),
+            server.url.replace("http", "ws").replace("/view", "/ws"), str(server.process.pid), str(wait),
+            str(number), stdout=asyncio.subprocess.PIPE,
+        )  # fmt: skip
+        assert killer.stdout is not None
+        said, when = (await killer.stdout.readline()).split()
+        assert said == b"sent"
+        t_lost = float(when) - robot.clock.origin
+        moved = bool(robot.host.reference(np.array([t_lost])).qd.any())
+        await until(lambda: robot.host.site is not None and robot.host.site.halted, 3.0)
+        t_halt = robot.clock.now()
+        assert robot.host.site is not None
+        reason = robot.host.site.halted
+        await asyncio.sleep(1.5)
+        if number == signal.SIGSTOP:
+            server.kill(signal.SIGCONT)
+            await asyncio.sleep(1.5)
+        ticks, asked = rows.until(round(robot.clock.now() / 0.001))
+        q, qd = asked[:, :6], asked[:, 6:]
+        moving = np.flatnonzero(np.abs(qd).max(axis=1) > 0)
+        last = int(moving[-1]) if len(moving) else 0
+        limits = MODEL.limits
+        excess = max(
+            float((np.abs(np.diff(qd, axis=0)) / (limits.qdd_max * 1e-3)).max()),
+            float((np.abs(np.diff(q, axis=0)) / (limits.qd_max * 1e-3)).max()),
+        )
+        stood = ticks >= 1e3 * (t_lost + HALT.timeout + 0.02 + 2 * float((limits.qd_max / limits.qdd_max).max()))
+        went_on = float(np.ptp(q[stood], axis=0).max()) if stood.any() else np.inf
+        await asyncio.wait_for(killer.wait(), 20.0)
+        return Lost(
+            t_lost, reason, moved, t_halt - t_lost, float(ticks[last]) * 1e-3 - t_lost, excess, went_on,
+            robot.health()["faults"],
+        )  # fmt: skip
 
 
 @dataclass

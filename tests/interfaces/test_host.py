@@ -9,7 +9,15 @@ import pytest
 
 from interfaces.link import Conditions, LinkConditions, delay_profile
 from interfaces.messages.sites import Orders
-from interfaces.teleop import OperatorSite, RobotHost, RobotHostConfig, RobotLine, RobotSiteConfig, VirtualArm
+from interfaces.teleop import (
+    JointReference,
+    OperatorSite,
+    RobotHost,
+    RobotHostConfig,
+    RobotLine,
+    RobotSiteConfig,
+    VirtualArm,
+)
 from interfaces.teleop.operator import Halt, HaltCause
 from robots import puma560
 from robots.onboard.watchdog import LossPolicy, WatchdogConfig
@@ -32,7 +40,9 @@ class Ends:
         site: RobotSiteConfig | None = None,
         q: Array = NOMINAL,
         lead: float = RobotHostConfig().lead,
+        step: float = STEP,
     ) -> None:
+        self.step = step
         self.conditions = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
         self.config = RobotHostConfig(site=RobotSiteConfig() if site is None else site, lead=lead)
         self.t = 0.0
@@ -40,8 +50,8 @@ class Ends:
         self.host = self.robot(q)
         self.new_operator("first")
 
-    def robot(self, q: Array) -> RobotHost:
-        self.rate, self.ahead = 1.0 + 50e-6, 1234.5
+    def robot(self, q: Array, rate: float = 1.0 + 50e-6, ahead: float = 1234.5) -> RobotHost:
+        self.rate, self.ahead = rate, ahead
         return RobotHost(MODEL, q, now=self.robots(), config=self.config, seed=7)
 
     def robots(self) -> float:
@@ -62,8 +72,8 @@ class Ends:
         return self.t - self.began
 
     def run(self, seconds: float, *, operator: bool = True, robot: bool = True) -> None:
-        for _ in range(round(seconds / STEP)):
-            self.t += STEP
+        for _ in range(round(seconds / self.step)):
+            self.t += self.step
             if operator:
                 messages = self.line.advance(now=self.now)
                 for message in messages if robot else ():
@@ -88,8 +98,8 @@ class Ends:
         assert (np.abs(asked[:, 1]) <= LIMITS.qd_max * (1 + 1e-9)).all()
         assert (np.abs(asked[:, 2]) <= LIMITS.qdd_max * (1 + 1e-9)).all()
         for (q, qd, _), (q_next, qd_next, _) in pairwise(asked):
-            assert (np.abs(qd_next - qd) <= 1.01 * LIMITS.qdd_max * STEP).all()
-            assert (np.abs(q_next - q - STEP * qd) <= 0.51 * LIMITS.qdd_max * STEP**2 * 2 + 1e-9).all()
+            assert (np.abs(qd_next - qd) <= 1.01 * LIMITS.qdd_max * self.step).all()
+            assert (np.abs(q_next - q - self.step * qd) <= 0.51 * LIMITS.qdd_max * self.step**2 * 2 + 1e-9).all()
 
 
 def to(q: Array, **options: object) -> MotionCommand:
@@ -290,6 +300,18 @@ def test_who_comes_next_is_followed_once_the_body_stands() -> None:
     ends.run(3.0)
     assert ends.host.session == "second"
     ends.check()
+
+
+def test_an_arm_that_stands_beyond_a_limit_by_rounding_takes_the_next_operator() -> None:
+    ends = Ends()
+    ends.go()
+    at = JointReference(*(np.array([row]) for row in (LIMITS.q_min - 1e-11, np.zeros(6), np.zeros(6))))
+    ends.host.reference = lambda t: at  # type: ignore[method-assign]
+    ends.run(2.5, operator=False)
+    ends.new_operator("second")
+    ends.run(3.0)
+    assert ends.host.site is not None
+    assert np.array_equal(ends.host.site.engine.timeline.initial, LIMITS.q_min)
 
 
 def test_stamps_are_told_by_the_robots_clock_while_the_clocks_drift() -> None:

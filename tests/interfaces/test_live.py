@@ -5,9 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,9 +25,9 @@ from tests.interfaces.live_rig import (
     Rows,
     child,
     child_beside,
+    lose_operator,
     operator_here,
     robot_here,
-    until,
 )
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.commands import Command
@@ -120,43 +118,21 @@ def test_without_its_operator_the_robot_brakes_in_time() -> None:
 
     async def session() -> None:
         site = RobotSiteConfig(beat=0.03, watchdog=HALT)
+        brake = float((LIMITS.qd_max / LIMITS.qdd_max).max())
         async with robot_here(site=site) as (robot, url):
             rows = Rows(robot)
             for wait in rng.uniform(0.3, 2.0, KILLS):
-                await killed(robot, rows, url, float(wait))
+                lost = await lose_operator(robot, rows, url, float(wait))
+                moving.append(lost.moved)
+                assert "link loss" in lost.said
+                # It's decided a lead ahead, so that it begins at T_loss.
+                assert lost.halted <= HALT.timeout + 0.02
+                assert lost.rested <= HALT.timeout + 0.02 + 2 * brake
+                assert lost.excess <= 1 + 1e-6
+                assert lost.went_on == 0.0
+                assert lost.faults == 0
             # Some instants lie between two moves.
             assert sum(moving) >= KILLS / 2
-
-    async def killed(robot, rows: Rows, url: str, wait: float) -> None:
-        address = url.removeprefix("ws://").removesuffix("/site")
-        async with child_beside("serve", "--port", "0", "--robot-at", address) as server:
-            # In a process of its own, so that it takes nothing of the robot's time.
-            killer = await asyncio.create_subprocess_exec(
-                sys.executable, str(Path(__file__).with_name("killer.py")),
-                server.url.replace("http", "ws").replace("/view", "/ws"), str(server.process.pid), str(wait),
-                stdout=asyncio.subprocess.PIPE,
-            )  # fmt: skip
-            assert killer.stdout is not None
-            assert await killer.stdout.readline() == b"killed\n"
-            t_kill = robot.clock.now()
-            moved = robot.host.reference(np.array([t_kill])).qd
-            await until(lambda: robot.host.site is not None and robot.host.site.halted, 3.0)
-            assert "link loss" in robot.host.site.halted
-            t_halt = robot.clock.now()
-            # It's decided a lead ahead, so that it begins at T_loss.
-            assert t_halt - t_kill <= HALT.timeout + 0.02
-            await asyncio.sleep(1.5)
-            ticks, asked = rows.until(round(robot.clock.now() / 0.001))
-            q, qd = asked[:, :6], asked[:, 6:]
-            moving.append(bool(moved.any()))
-            assert np.abs(qd[-1]).max() == 0.0
-            assert (np.abs(np.diff(qd, axis=0)) <= LIMITS.qdd_max * 1e-3 * (1 + 1e-6) + 1e-9).all()
-            assert (np.abs(np.diff(q, axis=0)) <= LIMITS.qd_max * 1e-3 * (1 + 1e-6) + 1e-9).all()
-            still = ticks[np.abs(qd).max(axis=1) > 0][-1] * 1e-3
-            brake = float((LIMITS.qd_max / LIMITS.qdd_max).max())
-            assert still <= t_kill + HALT.timeout + 0.02 + 2 * brake
-            assert robot.health()["faults"] == 0
-            await asyncio.wait_for(killer.wait(), 20.0)
 
     asyncio.run(session())
 

@@ -257,6 +257,8 @@ def test_scenes_are_read_and_say_what_is_wrong(tmp_path: Path) -> None:
         (f"floor = 0\n{a}", "either a box"),
         (f"floor = 0\n{a}box = [1, 1, 1]\nmass = -1", "mass"),
         (f"floor = 0\n{a}box = [1, 1, 1]\n{a}box = [1, 1, 1]", "there twice"),
+        (f"floor = {'[' * 5000}", "recursion"),
+        (f"floor = {'9' * 5000}", "digits"),
     ):
         path.write_text(text)
         with pytest.raises(FormatError, match=said):

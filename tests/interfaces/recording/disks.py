@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import time
+from pathlib import Path
 from threading import Event
 
 
@@ -53,14 +55,34 @@ class Failing(Disk):
 
 
 class Hanging(Disk):
-    """Hangs from the second block on, until it's let go."""
+    """Hangs after so many writes, until it's let go."""
 
-    def __init__(self) -> None:
+    def __init__(self, after: float = 2) -> None:
         super().__init__()
+        self.after = after
         self.hangs, self.free = Event(), Event()
 
     def take(self, data: bytes | memoryview) -> int | None:
-        if self.calls > 2:
+        if self.calls > self.after:
             self.hangs.set()
             self.free.wait(30.0)
         return super().take(data)
+
+
+class Filling:
+    """A file that has room for so many bytes."""
+
+    def __init__(self, path: Path, room: int) -> None:
+        self.file, self.room = path.open("wb", buffering=0), room
+        self.full = 0.0
+        """When it took less than it was given, by the machine's monotonic counter [s]; 0 before."""
+
+    def write(self, data: bytes | memoryview, /) -> int | None:
+        some = bytes(data)[: self.room]
+        self.room -= len(some)
+        if len(some) < len(data):
+            self.full = self.full or time.monotonic()
+        return self.file.write(some)
+
+    def close(self) -> None:
+        self.file.close()

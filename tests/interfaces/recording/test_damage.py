@@ -30,11 +30,16 @@ EVERY = int(os.environ.get("VRS_FLIPS", "61"))
 SECONDS = 1.5
 
 
-@pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(folder: Path) -> Path:
+    """Write a small recording."""
     messages, engine, _ = recorded.motion(SECONDS, step=0.05, every=0.4, drawn=1.0)
     messages.append((SECONDS, recorded.history(engine, 4)))
-    return recorded.write(tmp_path_factory.mktemp("damage") / "run.mcap", messages, end=SECONDS)
+    return recorded.write(folder / "run.mcap", messages, end=SECONDS)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return whole(tmp_path_factory.mktemp("damage"))
 
 
 def last_block(data: bytes) -> int:

@@ -32,6 +32,7 @@ from interfaces.stream.server import application
 from interfaces.teleop import OperatorSite, RobotLine, VirtualArm
 from tests.interfaces.live_rig import MODEL, NOMINAL, READY, ROBOT, child, robot_here, until
 from tests.interfaces.recording import shown
+from tests.interfaces.recording.disks import Filling
 from vrs import Insertion, JointTarget, MotionCommand, Status, SteerCommand
 
 
@@ -115,19 +116,7 @@ def test_what_a_live_site_did_is_in_its_recording(tmp_path):
 
 
 def test_a_disk_that_fills_up_is_told_and_nothing_else_happens(tmp_path, monkeypatch):
-    class Small:
-        def __init__(self, path):
-            self.file, self.room = path.open("wb", buffering=0), 12_000
-
-        def write(self, data):
-            some = bytes(data)[: self.room]
-            self.room -= len(some)
-            return self.file.write(some)
-
-        def close(self):
-            self.file.close()
-
-    monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path, **_: cls(Small(path), str(path))))
+    monkeypatch.setattr(Sink, "create", classmethod(lambda cls, path, **_: cls(Filling(path, 12_000), str(path))))
     told = []
 
     async def main():

@@ -1,6 +1,7 @@
 """Who may come in."""
 
 import os
+import resource
 import stat
 
 import pytest
@@ -77,6 +78,18 @@ def test_a_token_has_43_to_256_characters(tmp_path, length, long_enough):
         read_tokens(path)
     with pytest.raises(InvalidValueError, match="43 to 256"):
         Access({Role.VIEWER: length * "v"})
+
+
+def test_a_full_disk_leaves_no_part_of_a_token_file(tmp_path):
+    path, (soft, hard) = tmp_path / "tokens", resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with pytest.raises(FormatError, match="can't be written"):
+            make_tokens(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not path.exists()
+    assert len(make_tokens(path)) == len(Role)
 
 
 def test_the_token_that_a_request_shows():

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -249,8 +250,6 @@ def test_lines_are_on_the_disk_and_one_that_fails_is_told(tmp_path: Path, monkey
 
 
 def _until(holds: Callable[[], bool]) -> None:
-    import time
-
     end = time.monotonic() + 30.0
     while not holds():
         assert time.monotonic() < end
@@ -269,6 +268,21 @@ def test_what_is_refused_again_and_again_is_counted(tmp_path: Path) -> None:
     assert len(refused) < 2 * LINES_BURST + 100
     assert sum(one.get("again", 1) for one in refused) == 20_000
     assert check_audit(path).problem == ""
+
+
+@pytest.mark.parametrize("step", [-3600.0, 3600.0])
+def test_a_calendar_that_steps_holds_no_refusal_back(
+    tmp_path: Path, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("interfaces.stream.audit.COUNTED", 0.01)
+    log, calendar = AuditLog(tmp_path / "audit.jsonl"), time.time
+    for _ in range(2):
+        log.refused(who="Mallory", what="hello", why="no token")
+    monkeypatch.setattr(time, "time", lambda: calendar() + step)
+    time.sleep(0.02)
+    log.advance()
+    _until(lambda: [one.get("again") for one in facts(log.path)] == [None, None, 1])
+    log.close()
 
 
 def test_a_hub_writes_who_has_control_who_takes_over_and_what_is_refused(tmp_path: Path) -> None:

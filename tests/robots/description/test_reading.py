@@ -289,6 +289,7 @@ def test_limits_of_moveit_count_and_toml_counts_more(tmp_path: Path) -> None:
         ("[poses.a]\nslide = inf", "Expected `float`"),
         ("tip = ", "isn't TOML"),
         ("tip = " + 4000 * "[", "isn't TOML"),
+        ("tip = " + 5000 * "9", "isn't TOML"),
     ],
 )
 def test_what_is_stated_wrong_is_named(tmp_path: Path, text: str, said: str) -> None:
