@@ -108,6 +108,7 @@ soak: $(DEV_STAMP)
 # out/faults; takes some nine hours, `$(PY) -m tests.fault_suite --only ROW --tries N` less.
 faults: $(DEV_STAMP)
 	$(PY) -m tests.fault_suite
+	$(PY) -m pytest -m faults tests/fault_suite
 
 # The wheel, in an empty environment outside the checkout, does the main job; what that is made of: out/sbom.json.
 wheel: $(DEV_STAMP)
