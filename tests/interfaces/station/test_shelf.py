@@ -7,11 +7,13 @@ import json
 import os
 
 import pytest
+from starlette.requests import HTTPConnection
 
 from interfaces.recording.playback import Align
 from interfaces.station import replays, shelf
 from interfaces.station.replays import Replays
 from interfaces.station.shelf import Shelf, checked_name
+from interfaces.stream.access import Admission
 from tests.interfaces.recording.made import make
 from vrs.clock import WallClock
 from vrs.errors import InvalidValueError
@@ -98,6 +100,13 @@ def test_the_list_says_what_is_wrong_and_is_bounded(kept, tmp_path, monkeypatch)
         assert len(directory.known) <= 2
 
 
+NOWHERE = HTTPConnection({"type": "websocket"})
+
+
+def allowed(_connection, token):
+    return Admission("" if token == "yes" else "another one")
+
+
 def standing(replay):
     return json.loads(replay.board.values["standing"][1])
 
@@ -112,17 +121,17 @@ def test_few_are_open_and_those_nobody_looks_at_are_closed(kept, monkeypatch):
 
     async def opened(served, **query):
         replay = served.replay_for({"a": "whole.mcap", **query})
-        assert not replay.let_in("no")
+        assert replay.let_in(NOWHERE, "no").refusal
         assert replay.task is None
         slot = replay.board.join()
-        assert replay.let_in("yes")
+        assert not replay.let_in(NOWHERE, "yes").refusal
         async with asyncio.timeout(30):
             while standing(replay)["kind"] == "opening":
                 await asyncio.sleep(0.01)
         return replay, slot
 
     async def main():
-        async with Replays(Shelf(kept), WallClock(), lambda token: token == "yes").running() as served:
+        async with Replays(Shelf(kept), WallClock(), allowed).running() as served:
             first, slot = await opened(served)
             assert standing(first)["kind"] == "open"
             assert served.replay_for({"a": "whole.mcap", "align": "start"}) is first
