@@ -37,6 +37,7 @@ SPELLED: Final = {
 """How packages say the same that don't say it by SPDX."""
 READ: Final = {
     "docutils": "public domain and BSD; its one file under the GPL, an Emacs mode, isn't in the wheel",
+    "eclipse-zenoh": "EPL-2.0 or Apache-2.0, as its LICENSE",
     "embreex": "BSD-2-Clause, as its LICENSE",
     "vhacdx": "MIT, as its LICENSE",
     "xacro": "BSD-3-Clause, as its LICENSE",
