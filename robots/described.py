@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +23,10 @@ from robots.description.rigid import carried, rigid_chain
 from robots.description.wheels import wheeled
 from robots.mobile import differential
 from robots.onboard.laser import LaserModel
-from robots.robot import NUMBERS, Appearance, Gripper, Robot
+from robots.robot import NUMBERS, TIP, Appearance, Gripper, Robot
 from robots.simulated import WORLDS, chain_arm
 from robots.solids import LinkShape, together
 from vrs.model import Array, frozen_array
-
-TIP: Final = "#"
-"""What stands between a file and the link at the end of the arm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

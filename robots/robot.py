@@ -51,7 +51,10 @@ FILES: Final = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
 """Endings of files that robots are read from."""
 NUMBERS: Final = "diff:"
 """What a mobile robot in numbers begins with."""
+TIP: Final = "#"
+"""What stands between a file and the link at the end of its arm; between a fleet's file and one of its robots."""
 _DESCRIBED: Final = "robots.described"
+_FLEET: Final = "robots.fleet"
 _DRIVER: Final = "robots.driver"
 """What reads them; it stands after this module, and is loaded when it's needed."""
 _GOALS = 8
@@ -452,13 +455,16 @@ def load(what: str) -> Robot:
 
     Args:
         what: Its name (see `names`); a URDF, xacro or MJCF file, with `#LINK` after it for the link at the end of
-            its arm; a TOML file of a mobile robot's numbers, or those as `diff:wheelbase=0.4,wheel=0.1`; or
-            `MODULE:NAME` of a `Robot` of one's own, whose module may lie in the working directory.
+            its arm; a TOML file of a mobile robot's numbers, or those as `diff:wheelbase=0.4,wheel=0.1`;
+            `FLEET.toml#NAME` for one of a fleet (`robots.fleet`); or `MODULE:NAME` of a `Robot` of one's own, whose
+            module may lie in the working directory.
 
     Raises:
         InvalidValueError: If there's no such robot, or what is there isn't one.
         FormatError: If its file can't be read, or its module can't be imported.
     """
+    if of_fleet(what):
+        return cast("Robot", importlib.import_module(_FLEET).member(what))
     if described(what):
         return cast("Robot", importlib.import_module(_DESCRIBED).robot_of(what))
     where, colon, name = what.partition(":")
@@ -474,6 +480,12 @@ def load(what: str) -> Robot:
         there = ", ".join(sorted(key for key, value in vars(module).items() if isinstance(value, Robot))) or "none"
         raise InvalidValueError(f"robot in {module.__name__}", name, f"a Robot there ({there})")
     return replace(robot, found_by=what)
+
+
+def of_fleet(what: str) -> bool:
+    """Whether a robot that's asked for is one of a fleet's, be it there or not."""
+    file, hashed, _ = what.rpartition(TIP)
+    return bool(hashed) and Path(file).suffix.lower() == ".toml"
 
 
 def described(what: str) -> bool:

@@ -28,7 +28,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 from msgspec import Meta
 
@@ -39,6 +39,8 @@ from vrs.record import Record, Time
 MOST_THINGS = 1000
 MOST_POINTS = 1000
 
+Posture: TypeAlias = tuple[float, float, float]
+"""x, y [m], θ [rad]."""
 Name = Annotated[str, Meta(max_length=200)]
 Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
 """[m]."""
@@ -212,7 +214,36 @@ class Door(Record, frozen=True, omit_defaults=True, gc=False):
         return fastest * self.length * (1.0 if self.sliding else abs(self.swing))
 
 
-Standing = Block | Column | Person | Door
+@dataclass(frozen=True, slots=True, eq=False)
+class Neighbour:
+    """Another robot in the same room, as its box: it's wherever it's driven."""
+
+    name: str
+    length: float
+    """Along its heading [m]."""
+    width: float
+    """[m]."""
+    height: float
+    """[m]."""
+    ahead: float
+    """How far its middle is before the point that its posture says [m]."""
+    speed: float
+    """Fastest that anything of it moves [m/s]."""
+    where: Callable[[], Posture]
+    """Its true posture now."""
+
+    def at(self, _t: float) -> Block:
+        """The box as it stands now, whatever time is asked for: nobody knows where it'll be."""
+        x, y, angle = self.where()
+        x, y = x + self.ahead * math.cos(angle), y + self.ahead * math.sin(angle)
+        return Block(self.name, x, y, self.length, self.width, angle, self.height, known=False)
+
+    def still(self, t: float) -> tuple[float, float]:
+        """From when to when it stands as it does at t [s]: it may move at any time."""
+        return t, t
+
+
+Standing = Block | Column | Person | Door | Neighbour
 """What a robot may run into, or what into it."""
 _BELOW = -100.0
 """Where things are that aren't there [m]."""
@@ -220,7 +251,7 @@ _BELOW = -100.0
 
 def moves(thing: Standing) -> bool:
     """Whether it ever moves, comes or goes."""
-    return isinstance(thing, Person | Door) or thing.start > -math.inf or thing.end < math.inf
+    return isinstance(thing, Person | Door | Neighbour) or thing.start > -math.inf or thing.end < math.inf
 
 
 def solid(thing: Standing) -> Block | Column:
@@ -228,14 +259,14 @@ def solid(thing: Standing) -> Block | Column:
     if isinstance(thing, Person):
         x, y = thing.at(0.0)
         return Column(thing.name, x, y, thing.radius, thing.height, known=False)
-    return thing.at(0.0) if isinstance(thing, Door) else thing
+    return thing.at(0.0) if isinstance(thing, Door | Neighbour) else thing
 
 
 def pose_at(thing: Standing, t: float) -> tuple[float, float, float, float]:
     """Where the middle of a thing is at a time [s]: x, y, z [m], heading [rad]; far below while it isn't there."""
     if isinstance(thing, Person):
         return *thing.at(t), thing.height / 2, 0.0
-    if isinstance(thing, Door):
+    if isinstance(thing, Door | Neighbour):
         thing = thing.at(t)
     angle = thing.angle if isinstance(thing, Block) else 0.0
     return thing.x, thing.y, thing.height / 2 if thing.stands(t) else _BELOW, angle
@@ -288,8 +319,8 @@ class Room:
     """Along x [m]."""
     width: float
     """Along y [m]."""
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where a robot begins: x, y [m], heading [rad]."""
+    start: Posture = (0.0, 0.0, 0.0)
+    """Where a robot begins."""
     blocks: tuple[Block, ...] = ()
     columns: tuple[Column, ...] = ()
     people: tuple[Person, ...] = ()
@@ -300,6 +331,8 @@ class Room:
     """Named points of the map."""
     sounds: tuple[Sound, ...] = ()
     """What is heard in it."""
+    neighbours: tuple[Neighbour, ...] = ()
+    """Other robots in it."""
 
     @property
     def things(self) -> tuple[Block | Column, ...]:
@@ -308,17 +341,18 @@ class Room:
 
     @property
     def standing(self) -> tuple[Standing, ...]:
-        """All that stands and walks in it: things, people, doors."""
-        return *self.things, *self.people, *self.doors
+        """All that stands and moves in it: things, people, doors, other robots."""
+        return *self.things, *self.people, *self.doors, *self.neighbours
 
     def known(self) -> Room:
-        """Return what the operator's map has: without unknown things, people and doors."""
+        """Return what the operator's map has: without unknown things, people, doors and other robots."""
         return replace(
             self,
             blocks=tuple(block for block in self.blocks if block.known),
             columns=tuple(column for column in self.columns if column.known),
             people=(),
             doors=(),
+            neighbours=(),
         )
 
     def place(self, name: str) -> Place:

@@ -23,7 +23,7 @@ ORDER = (
     # The robots.
     "robots.solids", "robots.rooms", "robots.base", "robots.robot", "robots.driver", "robots.chain",
     "robots.vehicle", "robots.things", "robots.description", "robots.bullet", "robots.mujoco", "robots.drives",
-    "robots.onboard", "robots.simulated", "robots.mobile", "robots.described", "robots.ipr",
+    "robots.onboard", "robots.simulated", "robots.mobile", "robots.described", "robots.fleet", "robots.ipr",
     "robots.puma560", "robots.cubo", "robots",
     # What the interfaces share; values that cross or are stored.
     "interfaces.system", "interfaces.pipes", "interfaces.timer", "interfaces.messages",

@@ -18,7 +18,7 @@ import typer
 
 from interfaces.system import is_loopback, on_signal
 from robots.robot import FOUND, USUAL, HeadCamera, described, load
-from vrs.errors import FormatError, InvalidValueError
+from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import asyncio
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from interfaces.val2.values import Dialect
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
-    from robots.rooms import Room
 
 
 def option(spelled: str, text: str, **more: Any) -> Any:
@@ -246,12 +245,12 @@ OF_ARMS: Final = ("offset", "lead", "friction", "pose", "scene")
 """Options that arms alone have, by their names without dashes."""
 OF_VAL: Final = ("val-port", "val-files")
 """The same of robots that VAL-II has places for."""
-OF_BASES: Final = ("architecture", "room", "jobs", "operator-loss")
+OF_BASES: Final = ("architecture", "room", "jobs", "operator-loss", "whereabouts")
 """The same of mobile robots."""
 OF_CAMERAS: Final = ("camera",)
 """The same of robots that pictures are made of."""
 OF_SITES: Final = (
-    "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead",
+    "listen", "architecture", "offset", "link-loss", "timeout", "operator-loss", "max-age", "lead", "whereabouts",
     "friction", "pose", "reports", "reached-as", "audit", "tls", "tls-cert", "tls-key", "datagrams",
 )  # fmt: skip
 """The same of robots that have a site, as thin clients haven't."""
@@ -314,27 +313,6 @@ def bars(before: str, after: str = "{task.completed}/{task.total}") -> Progress:
 
     columns = TextColumn(before), BarColumn(), TextColumn(after), TimeElapsedColumn()
     return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
-
-
-def room_of(text: str) -> Room:
-    """A room by its name, or of a file.
-
-    Raises:
-        InvalidValueError: If there's neither a room of that name nor such a file.
-        FormatError: If the file can't be read.
-    """
-    from robots.mobile.robot import PLACES, place
-    from robots.rooms import load_room
-
-    if text in PLACES:
-        return place(text)
-    path = Path(text)
-    if not path.is_file():
-        raise InvalidValueError("room", text, f"one of {', '.join(PLACES)}, or a file that's there")
-    try:
-        return load_room(path)
-    except OSError as error:
-        raise FormatError(path.name, error.strerror or str(error)) from None
 
 
 def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:
@@ -609,12 +587,12 @@ async def collect_at_leisure(free: Callable[[], bool]) -> None:
 
 
 async def start_robot(
-    robots: AsyncExitStack, robot_at: str | None, options: Sequence[str], ended: Callable[[str], None]
+    stack: AsyncExitStack, robot_at: str | None, options: Sequence[str], ended: Callable[[str], None]
 ) -> str:
     """Where the robot is; one is started if there's none, and if that ends it's told why."""
     from interfaces.runtime.live.process import local_robot
 
-    return await robots.enter_async_context(local_robot(options, ended)) if robot_at is None else robot_at
+    return await stack.enter_async_context(local_robot(options, ended)) if robot_at is None else robot_at
 
 
 def say_lost(lose: Callable[[str], None], lost: asyncio.Future[str]) -> None:
@@ -632,10 +610,10 @@ async def abandon(task: asyncio.Task[str]) -> None:
     await asyncio.wait([task])
 
 
-def say_robot(url: str, conditions: LinkConditions, link_loss: LossPolicy | None) -> None:
-    """Say on standard error where the robot is, what is emulated on the way there, and what it's asked to do."""
+def say_robot(where: str, conditions: LinkConditions, link_loss: LossPolicy | None) -> None:
+    """Say on standard error where robots are, what is emulated on the way there, and what they're asked to do."""
     asked = "" if link_loss is None else f", link loss: {link_loss}"
-    typer.echo(f"vrs: robot at {url}, emulated delay {conditions.forward.delay.name}{asked}", err=True)
+    typer.echo(f"vrs: {where}, emulated delay {conditions.forward.delay.name}{asked}", err=True)
 
 
 def saying_policy() -> Callable[[Attached], None]:

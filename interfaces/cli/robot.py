@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import secrets
 import sys
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -41,7 +42,6 @@ from interfaces.cli.options import (
     left_out,
     option,
     robot_of,
-    room_of,
     say_certificate,
     saying_policy,
     schemes,
@@ -52,7 +52,7 @@ from interfaces.cli.options import (
 )
 from interfaces.system import run_loop, software
 from robots.driver import load_driver, standing
-from robots.robot import USUAL, USUAL_CLIENT, ThinClient, is_driver, load
+from robots.robot import TIP, USUAL, USUAL_CLIENT, ThinClient, is_driver, load, of_fleet
 from vrs.checks import number_in, one_of
 from vrs.errors import FormatError, InvalidValueError
 from vrs.model import home
@@ -175,6 +175,10 @@ def robot(
     tip: Tip = "",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
+    whereabouts: Annotated[
+        Path | None,
+        option("FILE", "Of a fleet's robot that vrs serve starts: where all of them say where they are."),
+    ] = None,
     offset: Annotated[
         str, option("OFFSET", "How far behind the operator it plays: adaptive or fixed:S.")
     ] = "adaptive",
@@ -214,8 +218,10 @@ def robot(
     """Run the real robot and its site, until Ctrl-C or SIGTERM."""
     if rsp is not None:
         left_out(ctx, "a thin client has nothing of the kind", OF_SITES)
+        from robots.mobile.robot import find_room
+
         client = USUAL_CLIENT if name == USUAL else name
-        thin_client(client, body, rsp, rsp_model, room_of(room), token_file, until_eof=until_eof)
+        thin_client(client, body, rsp, rsp_model, find_room(room), token_file, until_eof=until_eof)
         return
     if rsp_model is not None:
         raise InvalidValueError("--model", str(rsp_model), "given with --rsp only")
@@ -243,6 +249,7 @@ def robot(
         theirs = own_certificate(site_certificate(token_file), (), client=True)
     door = _Door(address, allowed, shown, theirs, shown is not None if datagrams is None else datagrams)
     made: LiveBody
+    place, shared = _surroundings(ctx, name, room, whereabouts)
     if chosen.is_base:
         from interfaces.jobs import RunnerConfig
         from interfaces.media import Aloud
@@ -258,7 +265,7 @@ def robot(
         hands = Hands(speaker=Aloud(), arm=ValArm(beside=in_a_thread()))
         jobs = RunnerConfig(loss=loss)
         made = PacedBody(
-            PacedConfig(chosen.with_body(body), room_of(room), architecture, driven, jobs, hands, halting=halting)
+            PacedConfig(chosen.with_body(body), place, architecture, driven, jobs, hands, halting=halting, **shared)
         )
         kind, remark = architecture, POLICY_SAYS[loss]
     else:
@@ -287,6 +294,34 @@ def robot(
         access.audit = log
         problem = run_loop(main())
     _end(problem)
+
+
+def _surroundings(
+    ctx: typer.Context, name: str, room: str, whereabouts: Path | None
+) -> tuple[Room, dict[str, Any]]:
+    """Where a robot drives, and what it shares with others there; one of a fleet drives in the fleet's room.
+
+    Raises:
+        InvalidValueError: If there's no such room; if one of a fleet is given a room, or another robot whereabouts.
+        FormatError: If a file can't be read.
+    """
+    from robots.mobile.robot import find_room
+
+    if not of_fleet(name):
+        if whereabouts is not None:
+            raise InvalidValueError("whereabouts", str(whereabouts), "left out but for a robot of a fleet")
+        return find_room(room), {}
+    from interfaces.runtime.live.whereabouts import Whereabouts
+    from robots.fleet import read_fleet
+
+    left_out(ctx, "the fleet's file says where its robots are", ("room",))
+    file, _, called = name.rpartition(TIP)
+    fleet = read_fleet(file)
+    k = fleet.place(called)
+    if whereabouts is None:
+        return fleet.room_of(k), {}
+    shared = Whereabouts(whereabouts)
+    return fleet.room_of(k, shared.where), {"told": partial(shared.put, k), "since": shared.time()}
 
 
 def _offset(text: str) -> float | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote
 
@@ -47,7 +49,6 @@ from interfaces.cli.options import (
     left_out,
     option,
     robot_of,
-    room_of,
     say_certificate,
     say_lost,
     say_robot,
@@ -77,6 +78,7 @@ if TYPE_CHECKING:
     from interfaces.stream.audit import AuditLog
     from interfaces.stream.certificates import Certificate
     from interfaces.stream.join import JoinPages
+    from robots.fleet import Fleet
     from robots.onboard.watchdog import LossPolicy
     from robots.robot import Robot
     from robots.rooms import Room
@@ -88,6 +90,10 @@ def serve(
     host: Host = "127.0.0.1",
     port: Port = 8600,
     names: RobotNames = None,
+    fleet_file: Annotated[
+        Path | None,
+        option("--robots FLEET.toml", "Many robots in one room, instead of --robot: docs/howto/fleet.md."),
+    ] = None,
     tip: Tip = "",
     architecture: Architecture = ARCHITECTURE,
     room: RoomName = ROOM,
@@ -180,17 +186,26 @@ def serve(
     from interfaces.recording.mcap_file import Sink
     from interfaces.runs.twin_run import fixed_offset, spelled
     from interfaces.runtime.live.emulation import late_often, too_slow
+    from interfaces.runtime.live.whereabouts import write_starts
     from interfaces.stream.access import OPEN, read_tokens
     from interfaces.stream.certificates import kept_certificate, peer
     from interfaces.teleop.architectures import architecture as makes
     from robots.bullet.grasping import fingered
+    from robots.mobile.robot import find_room
     from robots.onboard.watchdog import LossPolicy
     from robots.things import read_scene
 
+    fleet = None
+    if fleet_file is not None:
+        from robots.fleet import read_fleet
+
+        left_out(ctx, "the fleet's file says it", ("robot", "tip", "room", "body"))
+        left_out(ctx, "each robot of a fleet is started here", ("robot-at", "robot-token-file"))
+        fleet = read_fleet(fleet_file)
     names = names or [USUAL]
     if tip and len(names) > 1:
         raise InvalidValueError("tip", tip, "left out of several robots: FILE#LINK says it of each")
-    robots = [robot_of(name, tip) for name in names]
+    robots = [robot_of(name, tip) for name in names] if fleet is None else [one.robot for one in fleet.members]
     if len({robot.name for robot in robots}) < len(robots):
         raise InvalidValueError("robot", ", ".join(names), "each robot once")
     policy = None if link_loss is None else LossPolicy(one_of("link-loss", link_loss, LossPolicy))
@@ -225,7 +240,8 @@ def serve(
     if at is not None:
         peer(at, theirs)
     check_taken(robots, ctx)
-    place = room_of(room)
+    place = find_room(room)
+    rooms = [place if fleet is None else fleet.room_of(k) for k in range(len(robots))]
     if any(robot.is_base for robot in robots):
         if jobs.exists() and not jobs.is_file():
             raise InvalidValueError("jobs", str(jobs), "a file, or one that can be made")
@@ -249,9 +265,10 @@ def serve(
     if advice:
         typer.echo(f"vrs: {advice}", err=True)
     given = {
-        "offset": behind, "max-age": f"{max_age:g}", "room": room, "architecture": architecture,
-        "operator-loss": operator_loss,
+        "offset": behind, "max-age": f"{max_age:g}", "architecture": architecture, "operator-loss": operator_loss,
     }  # fmt: skip
+    if fleet is None:
+        given["room"] = room
     if scene is not None:
         # Before a robot is started.
         for robot in robots:
@@ -262,6 +279,11 @@ def serve(
     access, teacher = class_access(host, token_file) if class_ else (access_for(host, token_file, free=OPEN), None)
     certificate = certificate_for(host, token_file, reached_as or (), tls=tls, chain=tls_cert, key=tls_key)
     speaker = next((robot for robot in robots if speaks_val(robot)), None)
+    shared = None
+    if fleet is not None:
+        shared = TemporaryDirectory(prefix="vrs-fleet-")
+        given["whereabouts"] = str(Path(shared.name) / "whereabouts")
+        write_starts(Path(given["whereabouts"]), [one.start for one in fleet.members])
     serving = []
     for k, (robot, named, path) in enumerate(zip(robots, bodies, records, strict=True)):
         kept = {option: value for option, value in given.items() if option not in untaken(robot)}
@@ -274,17 +296,17 @@ def serve(
             *(word for option, value in kept.items() for word in (f"--{option}", value)),
         ]
         eye = camera if robot.device(HeadCamera) else 0.0
-        folder = f"/robots/{quote(robot.name, safe='')}" if k else ""
+        folder = f"/robots/{quote(robot.name, safe='')}" if k or fleet is not None else ""
         serving.append(_Serving(
-            robot, link, seed + k, policy, at, token, theirs, datagrams, tuple(options), place,
+            robot, link, seed + k, policy, at, token, theirs, datagrams, tuple(options), rooms[k],
             _own(jobs, k, robot), eye,
             val_port if robot is speaker else None, val_files if speaks_val(robot) else None, path, recordings,
             behind, architecture, folder, in_order,
         ))  # fmt: skip
     taught = _Class(reached_as[0] if reached_as else "", teacher) if class_ else None
-    with audit_log(audit) as log:
+    with audit_log(audit) as log, shared or contextlib.nullcontext():
         access.audit = log
-        run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, until_eof=until_eof))
+        run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, fleet, until_eof=until_eof))
 
 
 def _site_url(text: str) -> str:
@@ -383,7 +405,6 @@ class _Class:
 async def _show_codes(pages: JoinPages) -> None:
     """Print the codes of a class whenever there are new ones."""
     import asyncio
-    import contextlib
 
     pictures = sys.stdout.isatty() and sys.stdout.encoding.lower() == "utf-8"
     while True:
@@ -403,19 +424,25 @@ async def _serve(
     taught: _Class | None,
     certificate: Certificate | None,
     log: AuditLog | None,
+    fleet: Fleet | None,
     *,
     until_eof: bool,
 ) -> None:
     """Run until a signal comes. The page is there before the robots are."""
     import asyncio
-    import contextlib
 
     from interfaces.link.proxy import Address
     from interfaces.stream import sockets
 
     ended = asyncio.Event()
     end_on_signal(ended)
-    async with contextlib.AsyncExitStack() as robots, contextlib.AsyncExitStack() as stack:
+    robots = [contextlib.AsyncExitStack() for _ in serving]
+
+    async def end_robots() -> None:
+        await asyncio.gather(*(robot.aclose() for robot in robots))
+
+    async with contextlib.AsyncExitStack() as last, contextlib.AsyncExitStack() as stack:
+        last.push_async_callback(end_robots)
         listening = stack.enter_context(contextlib.closing(sockets.bind(host, port)))
         shown = Address(shown_host(host), listening.getsockname()[1])
         val_listening = None
@@ -423,9 +450,9 @@ async def _serve(
             if one.val_port is not None:
                 val_listening = stack.enter_context(contextlib.closing(sockets.bind("127.0.0.1", one.val_port)))
         starting = []
-        for one in serving:
+        for one, own in zip(serving, robots, strict=True):
             lost: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-            robot = asyncio.create_task(start_robot(robots, one.robot_at, one.options, lost.set_result))
+            robot = asyncio.create_task(start_robot(own, one.robot_at, one.options, lost.set_result))
             stack.push_async_callback(abandon, robot)
             starting.append((robot, lost))
         await asyncio.to_thread(_load)
@@ -435,13 +462,14 @@ async def _serve(
         from interfaces.messages.control import Role
         from interfaces.runtime.live.operator import share_world
         from interfaces.runtime.live.twins import ArmTwins
+        from interfaces.station.fleet_page import FleetPage
         from interfaces.station.plans import Plans
         from interfaces.station.poses import Poses
         from interfaces.station.record import Recordings
         from interfaces.station.shelf import Shelf
         from interfaces.stream.access import Access, make_token
         from interfaces.stream.local import LocalClient
-        from interfaces.stream.server import application
+        from interfaces.stream.server import admit, application
         from interfaces.val2.pages import PageTerminalServer
         from interfaces.val2.rooms import HOST, served_room
         from interfaces.val2.tcp import TcpTerminalServer
@@ -449,12 +477,19 @@ async def _serve(
         from vrs.clock import WallClock
 
         clock = WallClock()
-        operators = [_operator(one, access, clock, log) for one in serving]
-        if len(serving) > 1:
-            await asyncio.to_thread(share_world, operators)
-        first: list[BaseRoute] = []
-        others: list[BaseRoute] = []
         parts: list[AbstractAsyncContextManager[object]] = []
+        operators = [_operator(one, access, clock, log) for one in serving]
+        overview = starts = None
+        if fleet is not None:
+            pages = [f"{one.folder}/" for one in serving]
+            starts = [one.start for one in fleet.members]
+            shown_to = partial(admit, access, Role.VIEWER)
+            overview = FleetPage(fleet.room, starts, operators, pages, clock, shown_to)
+            parts.append(overview.running())
+        if len(serving) > 1:
+            await asyncio.to_thread(share_world, operators, starts, None if overview is None else overview.scene)
+        first: list[BaseRoute] = [] if overview is None else overview.routes
+        others: list[BaseRoute] = []
         for one, operator, (_, lost) in zip(serving, operators, starting, strict=True):
             lost.add_done_callback(partial(say_lost, operator.lose))
             shelf, what = Shelf(one.recordings, one.robot), partial(one.recording, over=False)
@@ -489,7 +524,10 @@ async def _serve(
             collect_at_leisure(lambda: all(operator.hub.lease_state is LeaseState.FREE for operator in operators))
         )
         stack.callback(tidying.cancel)
-        for one in serving:
+        if overview is not None:
+            below = f"programs: {ws}://{shown}/robots/NAME/ws{known}"
+            typer.echo(f"vrs: operator station of {len(serving)} robots on {page}://{shown}/ ({below})")
+        for one in serving if overview is None else ():
             at = f"{shown}{one.folder}"
             typer.echo(f"vrs: serving {one.robot.name} on {page}://{at}/view (programs: {ws}://{at}/ws{known})")
             typer.echo(f"vrs: operator station on {page}://{at}/")
@@ -512,19 +550,25 @@ async def _serve(
         if until_eof:
             end_with_input(ended)
         ending = asyncio.create_task(ended.wait())
-        met = asyncio.gather(*map(_meet, serving, operators, (robot for robot, _ in starting)))
+        met = asyncio.gather(*(
+            _meet(one, operator, robot, says=fleet is None)
+            for one, operator, (robot, _) in zip(serving, operators, starting, strict=True)
+        ))  # fmt: skip
         stack.callback(met.cancel)
         waiting: list[asyncio.Future[Any]] = [met, ending]
         await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         if met.done():
             met.result()
+            if fleet is not None:
+                say_robot(f"all {len(serving)} robots are there", serving[0].conditions, serving[0].link_loss)
         await ending
 
 
-async def _meet(serving: _Serving, operator: LiveOperator, robot: asyncio.Task[str]) -> None:
-    """Let an operator's site find its robot, once that's there."""
+async def _meet(serving: _Serving, operator: LiveOperator, robot: asyncio.Task[str], *, says: bool) -> None:
+    """Let an operator's site find its robot, once that's there, and perhaps say so."""
     operator.robot.url = await robot
-    say_robot(operator.robot.url, serving.conditions, serving.link_loss)
+    if says:
+        say_robot(f"robot at {operator.robot.url}", serving.conditions, serving.link_loss)
 
 
 def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | None) -> LiveOperator:
@@ -559,6 +603,8 @@ def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool)
     offers |= {Offer.TERMINALS} if serving.val_files is not None else set()
     offers |= {Offer.QUEUE} if taught or serving.in_order else set()
     pages = [(one.robot.name, f"{one.folder}/", one is serving) for one in all_served]
+    if all(one.folder for one in all_served):
+        pages = [("all robots", "/", False), (robot.name, f"{serving.folder}/", True)]
     return Station(described(robot), panels_of(offers), pages if len(pages) > 1 else (), codes=taught)
 
 

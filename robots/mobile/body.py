@@ -133,6 +133,7 @@ class MobileBody(MobileRobot):
         limits: DriveLimits | None = None,
         senses: Senses | None = None,
         period: float = PERIOD,
+        since: float = 0.0,
     ) -> None:
         """Put a robot into a room, at rest; the other arguments and errors are those of `MobileRobot`.
 
@@ -146,6 +147,7 @@ class MobileBody(MobileRobot):
             limits: What commands must keep to.
             senses: What it senses with.
             period: What `follow` goes on by [s].
+            since: Time in the room when it's put there [s].
 
         Raises:
             InvalidValueError: If the world isn't installed, too.
@@ -154,8 +156,9 @@ class MobileBody(MobileRobot):
         self._make = WORLDS[world].vehicle
         self._vehicle: RigidVehicle | None = None
         super().__init__(
-            chassis, posture, room=room, reality=reality, rng=rng, limits=limits, senses=senses, period=period
-        )
+            chassis, posture, room=room, reality=reality, rng=rng, limits=limits, senses=senses, period=period,
+            since=since,
+        )  # fmt: skip
 
     def _begin(self) -> None:
         reality, start, train = self.reality, self.truth, self._train
@@ -242,7 +245,7 @@ class MobileBody(MobileRobot):
         _ = self.vehicle
 
     def _advance(self, n: int) -> None:
-        train, dt, vehicle = self._train, self.reality.dt, self.vehicle
+        train, vehicle = self._train, self.vehicle
         changing = vehicle.changing
         slip_right, slip_left = train.slips
         keep_right, keep_left = 1 - slip_right, 1 - slip_left
@@ -253,7 +256,7 @@ class MobileBody(MobileRobot):
             if self._steps % self._every_look == 0:
                 self._look()
                 if changing:
-                    vehicle.at(self._steps * dt)
+                    vehicle.at(self.time)
         self._observe()
 
     def _turn(self, right: float, left: float) -> None:

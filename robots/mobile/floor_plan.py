@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.onboard.gsp_map import GspMap, Lines
-from robots.rooms import Block, Column, Room
+from robots.rooms import Block, Column, Door, Neighbour, Room
 from vrs.checks import number_in
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -29,12 +29,13 @@ class FloorPlan:
         self._blocks = [block for block in room.blocks if block.height >= height]
         self._columns = [column for column in room.columns if column.height >= height]
         self._people = [person for person in room.people if person.height >= height]
-        self._doors = [door for door in room.doors if door.height >= height]
+        movers: tuple[Door | Neighbour, ...] = (*room.doors, *room.neighbours)
+        self._movers = [mover for mover in movers if mover.height >= height]
         things: list[Block | Column] = [*self._blocks, *self._columns]
         self.changes = sorted({t for thing in things for t in (thing.start, thing.end) if math.isfinite(t)})
         """When things come or go [s], ascending."""
         self._valid = (math.inf, -math.inf)
-        speeds = [person.speed for person in self._people] + [door.speed for door in self._doors]
+        speeds = [person.speed for person in self._people] + [mover.speed for mover in self._movers]
         self.fastest = max(speeds, default=0.0)
         """How fast anything in it moves [m/s]."""
 
@@ -180,12 +181,12 @@ class FloorPlan:
         """Bring the arrays to a time."""
         start, end = self._valid
         if not start <= t < end:
-            still = [door.still(t) for door in self._doors]
+            still = [mover.still(t) for mover in self._movers]
             self._valid = (
                 max([change for change in self.changes if change <= t] + [a for a, _ in still], default=-math.inf),
                 min([change for change in self.changes if change > t] + [b for _, b in still], default=math.inf),
             )
-            blocks = [block for block in self._blocks if block.stands(t)] + [door.at(t) for door in self._doors]
+            blocks = [block for block in self._blocks if block.stands(t)] + [mover.at(t) for mover in self._movers]
             self._names = [block.name for block in blocks]
             self._x, self._y, angle, length, width = (
                 np.array([[b.x, b.y, b.angle, b.length, b.width] for b in blocks], dtype=np.float64)

@@ -21,8 +21,8 @@ from robots.onboard.following import SensorWatch
 from robots.onboard.laser import LaserScan
 from robots.robot import Closing
 from robots.rooms import EMPTY, Room, load_room
-from vrs.checks import finite, integer_in, one_of
-from vrs.errors import InvalidValueError
+from vrs.checks import finite, integer_in, number_in, one_of
+from vrs.errors import FormatError, InvalidValueError
 from vrs.mobile import DriveLimits
 from vrs.model import Array, frozen_array
 
@@ -46,6 +46,28 @@ def place(name: str) -> Room:
         InvalidValueError: If there's none of that name.
     """
     return load_room(_ROOMS / f"{one_of('room', name, PLACES)}.room")
+
+
+def find_room(what: str, folder: Path = Path()) -> Room:
+    """A room by its name, or of a file.
+
+    Args:
+        what: A name of `PLACES`, or a file.
+        folder: From where a file's name counts.
+
+    Raises:
+        InvalidValueError: If there's neither a room of that name nor such a file.
+        FormatError: If the file can't be read.
+    """
+    if what in PLACES:
+        return place(what)
+    path = folder / what
+    if not path.is_file():
+        raise InvalidValueError("room", what, f"one of {', '.join(PLACES)}, or a file that's there")
+    try:
+        return load_room(path)
+    except OSError as error:
+        raise FormatError(path.name, error.strerror or str(error)) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +97,7 @@ class MobileRobot(Closing, ABC):
         limits: DriveLimits | None = None,
         senses: Senses | None = None,
         period: float = PERIOD,
+        since: float = 0.0,
     ) -> None:
         """Put a robot into a room, at rest.
 
@@ -87,6 +110,7 @@ class MobileRobot(Closing, ABC):
             limits: What commands must keep to; 0.5 m/s, 45 deg/s and 0.52 m/s², unless given.
             senses: What it senses with; everything, unless given.
             period: What `follow` goes on by [s], a multiple of the step.
+            since: Time in the room when it's put there [s], to whole steps.
 
         Raises:
             InvalidValueError: If a value is out of range, or the robot would stand in something.
@@ -103,6 +127,7 @@ class MobileRobot(Closing, ABC):
         self._odometry = Odometry(self._train, start)
         self._plan = FloorPlan(room)
         self._steps = 0
+        self._since = round(number_in("since", since, 0.0, 1e9, unit=" s") / reality.dt) * reality.dt
         self.truth = start
         """True posture as plain numbers: as `posture`, in a tenth of the time."""
         self.encoders = self._train.read((0.0, 0.0))
@@ -143,8 +168,8 @@ class MobileRobot(Closing, ABC):
 
     @property
     def time(self) -> float:
-        """Time since the robot was made [s]; the room's times count from then, too."""
-        return self._steps * self.reality.dt
+        """Time in its room [s], which begins when the robot is made unless that's said."""
+        return self._since + self._steps * self.reality.dt
 
     @property
     def posture(self) -> Array:

@@ -9,7 +9,7 @@ import secrets
 from collections.abc import AsyncIterator, Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from starlette.routing import BaseRoute
@@ -34,15 +34,17 @@ from interfaces.stream.certificates import Certificate
 from interfaces.stream.hub import Hub, HubConfig, Workers
 from interfaces.stream.leasing import LeasedRobot
 from interfaces.stream.meshcat.meshes import bodies
+from interfaces.stream.meshcat.newest import Nodes
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HubServer, admit
 from interfaces.teleop import OperatorSiteConfig
 from interfaces.teleop.operator import Halt, HaltCause, text_of
 from interfaces.timer import Turning
+from robots.base import upright
 from robots.onboard.lease import Ended, Grant, Lease, LeaseState
 from robots.onboard.watchdog import LossPolicy
 from robots.robot import Robot
-from robots.rooms import EMPTY, Room
+from robots.rooms import EMPTY, Posture, Room
 from robots.things import Scene
 from vrs.clock import Clock, WallClock, seconds_since_1970
 from vrs.errors import UnreachablePoseError, VrsError
@@ -308,22 +310,48 @@ class LiveOperator(LeasedRobot, Workers):
         }
 
 
-def share_world(sites: Sequence[LiveOperator]) -> None:
+TWINS: Final = frozenset({"virtual", "real", "committed"})
+"""What of a robot is seen in others' scenes of a fleet: not the way that it has driven."""
+SURROUNDINGS: Final = frozenset({"room", "doors", "people"})
+"""What of a mobile robot's scene is the room's, which all of a fleet have in common."""
+
+
+def share_world(
+    sites: Sequence[LiveOperator], starts: Sequence[Posture] | None = None, overview: Nodes | None = None
+) -> None:
     """Let each robot be seen in the scenes of the others, where it stands in one world; before any site runs.
 
     Mobile robots are where their room has them. Arms stand in a row to the left of where those begin, `APART` from
-    each other, their feet on the floor. It takes a moment.
+    each other, unless it's said where; their feet are on the floor. It takes a moment.
+
+    Args:
+        sites: The robots'.
+        starts: Of a fleet, where each begins, or its base stands; None for no fleet.
+        overview: A scene that shows all of a fleet.
     """
     places, arms = [], 0
-    for site in sites:
+    for k, site in enumerate(sites):
         X = np.eye(4)
         if not site.config.which.is_base:
             arms += 1
             x, y, theta = site.config.room.start
             aside = arms * APART
-            X[:3, 3] = x - aside * math.sin(theta), y + aside * math.cos(theta), -bodies(site.config.which)[1]
+            X[:2, 3] = x - aside * math.sin(theta), y + aside * math.cos(theta)
+            if starts is not None:
+                X = upright(*starts[k])
+            X[2, 3] = -bodies(site.config.which)[1]
         places.append(X)
+    parts = None if starts is None else TWINS
     for site, X_WA in zip(sites, places, strict=True):
         for other, X_WB in zip(sites, places, strict=True):
             if other is not site:
-                other.scene.show_in(site.scene, other.config.which.name, np.linalg.inv(X_WA) @ X_WB)
+                other.scene.show_in(site.scene, other.config.which.name, np.linalg.inv(X_WA) @ X_WB, parts)
+    if overview is None:
+        return
+    host = next((site for site in sites if site.config.which.is_base), None)
+    if host is not None:
+        host.scene.show_in(overview, "room", upright(0.0, 0.0, 0.0), SURROUNDINGS)
+    for site, X_WA in zip(sites, places, strict=True):
+        site.scene.show_in(overview, site.config.which.name, X_WA, TWINS)
+        if host is not None and not site.config.which.is_base:
+            host.scene.show_in(site.scene, "room", np.linalg.inv(X_WA) @ np.eye(4), SURROUNDINGS)

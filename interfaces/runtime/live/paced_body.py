@@ -66,6 +66,10 @@ class PacedConfig:
     """Of all architectures."""
     seed: int = 0
     """Of slip and of the senses' noise, ≥ 0."""
+    since: float = 0.0
+    """Time in the room when it's put there [s], ≥ 0."""
+    told: Callable[[tuple[float, float, float]], None] = lambda _: None
+    """Is told after each control period where the robot truly is: x, y [m], θ [rad]."""
 
     def __post_init__(self) -> None:
         architecture(self.architecture)
@@ -93,7 +97,9 @@ class PacedBody(LiveBody):
         senses = Senses(laser=config.robot.device(LaserModel) or LaserModel())
         rng = np.random.default_rng(config.seed)
         limits = config.robot.base.limits
-        self.body: MobileRobot = config.robot.body()(room=config.room, rng=rng, senses=senses, limits=limits)
+        self.body: MobileRobot = config.robot.body()(
+            room=config.room, rng=rng, senses=senses, limits=limits, since=config.since
+        )
         body, position = self.body, POSITIONS[config.position](self.body)
         self._position = SoundPosition(position, lambda: body.time)
         # The first look of its senses, before anybody waits for it.
@@ -157,6 +163,7 @@ class PacedBody(LiveBody):
         self._sight.look()
         body = self.body
         body.drive(drive.v, drive.w, round(CONTROL / body.reality.dt))
+        self.config.told(body.truth)
         self.ticks += 1
         site = self.host.site
         if body.watch.fault and site is not None and not site.halted:

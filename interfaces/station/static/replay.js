@@ -1,5 +1,6 @@
 // The play-back page: what the server says of the one play head, a scene for each recording, and their plots.
 import { Controls, Help, rounded } from "./controls.js";
+import { Door } from "./door.js";
 import { Side } from "./recorded.js";
 import { KINDS, Kinds, MarkShape, SeekBar, seconds } from "./seekbar.js";
 import "./theme.js";
@@ -139,7 +140,7 @@ function Page({ replay }) {
     </section>
     <p id="standing" role="status" hidden=${!standing || standing.kind === "open"} data-kind=${standing?.kind}>${standing?.text}</p>
     <${Help} dialog=${help} />
-    ${link === "token" && html`<${Door} replay=${replay} />`}`;
+    ${link === "token" && html`<${Door} page=${replay} />`}`;
 }
 
 /** A recording's robots, and what is known of them. */
@@ -216,22 +217,6 @@ function Status({ replay: { link, known, mode, rate } }) {
   };
   const text = { connecting: "Connecting…", lost: "No connection; trying again…", token: "Locked" }[link] ?? doing();
   return html`<p id="status" data-state=${link}><i></i><span id="status-text" role="status">${text}</span></p>`;
-}
-
-/** Asks for a token. */
-function Door({ replay }) {
-  const input = useRef(null);
-  useEffect(() => input.current.focus(), []);
-
-  function enter(event) {
-    event.preventDefault();
-    replay.unlock(input.current.value);
-  }
-
-  return html`<form id="enter" onSubmit=${enter}>
-    <label for="token">This server asks for a token.</label>
-    <div><input id="token" ref=${input} type="password" autocomplete="off" spellcheck="false" required /><button>Enter</button></div>
-    <p id="refused" hidden=${!replay.refused}>That token isn't valid here.</p></form>`;
 }
 
 const replay = new Replay();

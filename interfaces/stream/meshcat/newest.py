@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Final
 
 import msgspec
@@ -151,43 +151,58 @@ class Nodes(Newest):
     def __init__(self) -> None:
         """Begin with nothing to be seen."""
         super().__init__(_encoder.encode({"type": "delete", "path": ROOT}))
-        self._others: list[tuple[Nodes, str]] = []
-        """Scenes in which this one's robots are seen, too, and the node there below which they are."""
+        self._others: list[tuple[Nodes, str, frozenset[str] | None]] = []
+        """Scenes in which this one's robots are seen, too, below which node there, and what of them."""
 
-    def show_in(self, other: Nodes, name: str, X: Array) -> None:
+    def show_in(self, other: Nodes, name: str, X: Array, parts: frozenset[str] | None = None) -> None:
         """Let what stands below `ROOT` from now on be seen in another scene, too.
 
         Args:
             other: That scene.
             name: What this is called there.
             X: Where this scene's frame is in that one's, (4, 4).
+            parts: Names of the nodes below `ROOT` that are; None for all.
         """
         root = f"/beside/{name}"
-        self._others.append((other, root))
+        self._others.append((other, root, parts))
         other.put_transform(root, X)
 
     @property
     @override
     def readers(self) -> int:
-        return super().readers + sum(super(Nodes, other).readers for other, _ in self._others)
+        return super().readers + sum(super(Nodes, other).readers for other, *_ in self._others)
 
     @override
     def wake(self) -> None:
         super().wake()
-        for other, _ in self._others:
+        for other, *_ in self._others:
             super(Nodes, other).wake()
 
-    def _seen_at(self, path: str) -> Iterator[tuple[Nodes, str]]:
-        """Where else a node is seen; what is said of the scene as a whole is its own."""
-        if path.startswith(f"{ROOT}/"):
-            for other, root in self._others:
-                yield other, root + path[len(ROOT) :]
+    def _show(self, path: str, what: str, written: Callable[[str], bytes]) -> None:
+        """Put what a node has, here and wherever else it's seen: written once for each name that it has there.
+
+        Args:
+            path: The node.
+            what: Of it, to tell its values apart.
+            written: Makes the command, of the node's name.
+        """
+        self.put(path + what, written(path))
+        if not path.startswith(f"{ROOT}/"):
+            # What is said of the scene as a whole is its own.
+            return
+        below = path[len(ROOT) :]
+        part = below.split("/", 2)[1]
+        known: dict[str, bytes] = {}
+        for other, root, parts in self._others:
+            if parts is None or part in parts:
+                where = root + below
+                if where not in known:
+                    known[where] = written(where)
+                other.put(where + what, known[where])
 
     def put_transform(self, path: str, X: Array) -> None:
         """Put a node at X, (4, 4), in its parent's frame."""
-        self.put(path, set_transform(path, X))
-        for other, where in self._seen_at(path):
-            other.put_transform(where, X)
+        self._show(path, "", lambda where: set_transform(where, X))
 
     def put_object(self, path: str, lowered: Json) -> None:
         """Show an object at a node, in place of the one that's there.
@@ -196,13 +211,10 @@ class Nodes(Newest):
             path: The node; its children and its transform stay.
             lowered: The object as MeshCat's classes lower it: `geometries`, `materials`, `object`.
         """
-        self.put(f"{path} object", _encoder.encode({"type": "set_object", "object": lowered, "path": path}))
-        for other, where in self._seen_at(path):
-            other.put_object(where, lowered)
+        command = {"type": "set_object", "object": lowered}
+        self._show(path, " object", lambda where: _encoder.encode({**command, "path": where}))
 
     def put_property(self, path: str, name: str, value: Any) -> None:
         """Set a property of a node; the viewer keeps those that it doesn't know with the node."""
-        command = {"type": "set_property", "path": path, "property": name, "value": value}
-        self.put(f"{path} {name}", _encoder.encode(command))
-        for other, where in self._seen_at(path):
-            other.put_property(where, name, value)
+        command = {"type": "set_property", "property": name, "value": value}
+        self._show(path, f" {name}", lambda where: _encoder.encode({**command, "path": where}))

@@ -74,7 +74,7 @@ class DrawnRoom:
         for name, value in LOOKED_FROM.items():
             nodes.put_property(ROOT, name, value)
         nodes.put_property("/Axes", "visible", False)
-        nodes.put_transform("/Grid", _grid_at(low, high))
+        nodes.put_transform("/Grid", grid_at(low, high))
         nodes.put_property("/Grid", "visible", room is None)
         if room is not None:
             self._build(room)
@@ -132,7 +132,7 @@ class DrawnRoom:
             self._nodes.put_object(path, self._objects.tiles(path, places, 0.92 * grid.cell, LEARNED))
 
 
-def _grid_at(low: Array, high: Array) -> Array:
+def grid_at(low: Array, high: Array) -> Array:
     """Where the page's grid lies, and how large it is, to be under all that is to be seen."""
     scale = max(math.ceil(float((high - low).max()) / _CELL / 5), 1) * 5.0
     X = np.diag([scale, scale, 1.0, 1.0])
