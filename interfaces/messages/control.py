@@ -210,7 +210,8 @@ class ProblemCode(enum.StrEnum):
     TOO_LARGE = "too-large"
     """Longer than messages may be; see below."""
     TOO_FAST = "too-fast"
-    """More messages a second than are looked at; see below."""
+    """More messages a second than are looked at, see below; or what they cost is more than the client, or its
+    address, may spend: they wait, and are taken later."""
     HELLO_EXPECTED = "hello-expected"
     """The first message wasn't `hello`."""
     HELLO_LATE = "hello-late"

@@ -71,6 +71,8 @@ _KEPT = 16
 """One in so many places of clients is kept for those that may command."""
 _FORGIVEN = 1.0
 """Bad messages of a client that are forgiven a second."""
+HELD_UP = 0.25
+"""A client is told that its messages wait so long or longer [s]."""
 _MUTE = 1.0
 """Time between two complaints that a client sends too fast [s]."""
 _SERVED = frozenset({Role.VIEWER, Role.OPERATOR, Role.ADMIN})
@@ -236,6 +238,22 @@ class HubSession:
     def wait(self, *, now: float) -> float:
         """How long nothing more of the client is to be looked at [s]; 0 for at once."""
         return 0.0 if self.closing is not None else self._spending[self.commands].wait(now=now)
+
+    def say_waiting(self, wait: float, *, now: float) -> bool:
+        """Tell a client, once in a while, that its messages wait because of what it has spent.
+
+        Args:
+            wait: For how long [s]; a moment isn't worth a word.
+            now: Session time [s].
+
+        Returns:
+            Whether there's something to send.
+        """
+        if wait < HELD_UP or now < self._quiet_until or self.closing is not None:
+            return False
+        self._quiet_until = now + _MUTE
+        text = "more is asked than this client, or its address, may spend of the server: its messages wait"
+        return self.outbox.put(Problem(ProblemCode.TOO_FAST, text))
 
     def _hear(self, data: bytes | str, now: float) -> None:
         if self.closing is not None:

@@ -233,6 +233,8 @@ class HubServer:
                 session.spend(work, now=self.clock.now())
                 # Meanwhile nothing more is read: it waits at the client's end.
                 while (wait := session.wait(now=self.clock.now())) > 0.0:
+                    if session.say_waiting(wait, now=self.clock.now()):
+                        client.wake.set()
                     await asyncio.sleep(min(wait, LONGEST_WAIT))
             done = message.get("code") in _DONE and session.closing is None
         finally:

@@ -50,6 +50,19 @@ def test_a_crowd_waits_together_and_who_commands_for_nobody() -> None:
     assert 0.4 < worked < 0.05 * 10.0 + 0.05 * 0.2 + 30e-3 + 0.1
 
 
+def test_who_has_spent_too_much_is_told_that_its_messages_wait_once_a_second() -> None:
+    hub = make_hub()
+    peer, other = Peer(hub, now=5.0), Peer(hub, now=5.0)
+    session = peer.session
+    assert not session.say_waiting(session.wait(now=5.0), now=5.0)
+    session.spend(10.0, now=5.0)
+    said = [session.say_waiting(session.wait(now=now), now=now) for now in (5.0, 5.5, 5.9, 6.1)]
+    assert said == [True, False, False, True]
+    found = [(one.code, one.fatal, "its messages wait" in one.text) for one in peer.got(now=6.2)]
+    assert found == [(ProblemCode.TOO_FAST, False, True)] * 2
+    assert other.got(now=6.2) == []
+
+
 def test_a_burst_is_worked_off_in_slices_and_who_commands_goes_first() -> None:
     done: list[tuple[int, str]] = []
     rounds = [0]
