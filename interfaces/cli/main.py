@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+from concurrent.futures import BrokenExecutor
 from typing import Annotated
 
 import typer
@@ -48,7 +49,7 @@ app.command(short_help="The operator station in a browser, both robots live")(se
 app.command(short_help="The real robot alone: the remote site")(robot)
 app.command(short_help="Type VAL-II commands to an arm")(console)
 app.command(short_help="A VAL-II program on both twins")(run)
-app.command(short_help="What is wrong with a VAL-II program")(check)
+app.command(short_help="What is wrong with a VAL-II program, or assumed of a robot")(check)
 app.command(short_help="Play recordings back, in the browser or as lines")(replay)
 app.command(short_help="How far apart the twins of a recording were")(compare)
 app.command(short_help="A recording as tables or as a report")(export)
@@ -108,6 +109,8 @@ def exit_status(arguments: list[str]) -> int:
         return _say(f"{said} ({command} --help says what is allowed)", 2)
     except VrsError as error:
         return _say(str(error), 2)
+    except BrokenExecutor:
+        return _say("a worker was ended from outside: memory may be short; fewer --workers take less", 1)
     except BrokenPipeError:
         return _unheard(1)
     except OSError as error:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
@@ -121,6 +122,21 @@ def test_a_list_of_commands_is_cut_nowhere(capsys, monkeypatch):
     for arguments in ([], ["rsp", "--help"], ["rsp", "model", "--help"], ["middleware", "--help"]):
         assert exit_status(arguments) == 0
     assert not any(line.endswith("...") for line in capsys.readouterr().out.splitlines() if "Usage" not in line)
+
+
+def test_checks_of_a_driver_are_json_where_that_is_asked_for(capsys):
+    assert exit_status(["check", "--driver", "tests.robots.test_driver:Servos", "--json"]) == 2
+    (check,) = json.loads(capsys.readouterr().out)["checks"]
+    assert check == {"name": "works", "holds": False, "said": "the driver has 2 joints (one, two), the robot 6"}
+
+
+def test_a_worker_that_is_killed_is_a_line_and_no_bad_input(capsys, monkeypatch):
+    def broken(**_):
+        raise BrokenProcessPool
+
+    monkeypatch.setattr(sys.modules[exit_status.__module__], "app", broken)
+    assert exit_status(["lab"]) == 1
+    assert capsys.readouterr().err.startswith("vrs: a worker was ended")
 
 
 def test_help_and_version(capsys):
