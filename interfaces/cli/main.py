@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+import threading
 from concurrent.futures import BrokenExecutor
 from typing import Annotated
 
@@ -81,7 +82,16 @@ def main(arguments: list[str] | None = None) -> None:
     _ready_streams()
     # Whoever ends it so wants workers and robots ended as by Ctrl-C; what serves has its own way.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    sys.unraisablehook = _interrupt_again
     sys.exit(exit_status(sys.argv[1:] if arguments is None else arguments))
+
+
+def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
+    """Send an interruption again that came in a callback, as of an import, where Python can only print it."""
+    if isinstance(lost.exc_value, KeyboardInterrupt):
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _ready_streams() -> None:

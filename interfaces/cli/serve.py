@@ -513,7 +513,7 @@ async def _serve(
             end_with_input(ended)
         ending = asyncio.create_task(ended.wait())
         met = asyncio.gather(*map(_meet, serving, operators, (robot for robot, _ in starting)))
-        stack.callback(met.cancel)
+        stack.push_async_callback(abandon, met)
         waiting: list[asyncio.Future[Any]] = [met, ending]
         await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         if met.done():

@@ -146,6 +146,35 @@ def test_help_and_version(capsys):
     assert capsys.readouterr().out.splitlines()[-1].startswith("vrs-teleop ")
 
 
+def test_ctrl_c_while_the_robot_of_a_server_starts_is_no_traceback(tmp_path):
+    command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--body", "ideal"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path, text=True,
+                          env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}) as process:  # fmt: skip
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Traceback" not in said
+
+
+def test_ctrl_c_in_a_callback_that_nobody_hears_of_counts_all_the_same():
+    program = """if True:
+        import signal, sys, time, weakref
+        import interfaces.cli
+        door = sys.modules["interfaces.cli.main"]
+        class Lock: pass
+        def app(**_):
+            lock = Lock()
+            callback = weakref.ref(lock, lambda _: signal.raise_signal(signal.SIGINT))
+            del lock
+            time.sleep(30)
+        door.app = app
+        door.main(["demo"])
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False)
+    assert (done.returncode, done.stderr) == (130, "vrs: interrupted\n")
+
+
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_with_130_and_one_line(tmp_path, how):
     process = subprocess.Popen(
