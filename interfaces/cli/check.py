@@ -67,7 +67,8 @@ def check(
     if driver:
         from interfaces.cli.check_driver import check_driver
 
-        return 0 if check_driver(driver, robot_of(name, tip).arm.limits, move=move) else SUFFERED
+        limits = robot_of(name, tip).arm.limits
+        return 0 if check_driver(driver, limits, move=move, as_json=as_json) else SUFFERED
     if not programs:
         raise InvalidValueError("what is checked", "nothing", "files, or --driver MODULE:NAME")
     if any(described(str(path)) for path in programs):

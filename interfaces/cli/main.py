@@ -8,6 +8,8 @@ import logging
 import os
 import signal
 import sys
+import threading
+from concurrent.futures import BrokenExecutor
 from typing import Annotated
 
 import typer
@@ -48,7 +50,7 @@ app.command(short_help="The operator station in a browser, both robots live")(se
 app.command(short_help="The real robot alone: the remote site")(robot)
 app.command(short_help="Type VAL-II commands to an arm")(console)
 app.command(short_help="A VAL-II program on both twins")(run)
-app.command(short_help="What is wrong with a VAL-II program")(check)
+app.command(short_help="What is wrong with a VAL-II program, or assumed of a robot")(check)
 app.command(short_help="Play recordings back, in the browser or as lines")(replay)
 app.command(short_help="How far apart the twins of a recording were")(compare)
 app.command(short_help="A recording as tables or as a report")(export)
@@ -80,7 +82,16 @@ def main(arguments: list[str] | None = None) -> None:
     _ready_streams()
     # Whoever ends it so wants workers and robots ended as by Ctrl-C; what serves has its own way.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    sys.unraisablehook = _interrupt_again
     sys.exit(exit_status(sys.argv[1:] if arguments is None else arguments))
+
+
+def _interrupt_again(lost: sys.UnraisableHookArgs) -> None:
+    """Send an interruption again that came in a callback, as of an import, where Python can only print it."""
+    if isinstance(lost.exc_value, KeyboardInterrupt):
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _ready_streams() -> None:
@@ -108,6 +119,8 @@ def exit_status(arguments: list[str]) -> int:
         return _say(f"{said} ({command} --help says what is allowed)", 2)
     except VrsError as error:
         return _say(str(error), 2)
+    except BrokenExecutor:
+        return _say("a worker was ended from outside: memory may be short; fewer --workers take less", 1)
     except BrokenPipeError:
         return _unheard(1)
     except OSError as error:

@@ -602,12 +602,15 @@ def say_lost(lose: Callable[[str], None], lost: asyncio.Future[str]) -> None:
         lose(lost.result())
 
 
-async def abandon(task: asyncio.Task[str]) -> None:
+async def abandon(task: asyncio.Future[Any]) -> None:
     """Let a task end that nobody waits for any more."""
     import asyncio
 
     task.cancel()
     await asyncio.wait([task])
+    # Of some that are gathered, being cancelled is an exception, which asyncio logs unless somebody looks.
+    if not task.cancelled():
+        task.exception()
 
 
 def say_robot(where: str, conditions: LinkConditions, link_loss: LossPolicy | None) -> None:

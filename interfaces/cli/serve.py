@@ -554,7 +554,7 @@ async def _serve(
             _meet(one, operator, robot, says=fleet is None)
             for one, operator, (robot, _) in zip(serving, operators, starting, strict=True)
         ))  # fmt: skip
-        stack.callback(met.cancel)
+        stack.push_async_callback(abandon, met)
         waiting: list[asyncio.Future[Any]] = [met, ending]
         await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         if met.done():

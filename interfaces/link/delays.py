@@ -415,7 +415,7 @@ def read_trace(path: Path, *, longest: float) -> tuple[float | None, ...]:
         if COLUMN not in header:
             raise FormatError(f"{path}:1", f"the header must name a {COLUMN} column; given: {header}")
         column = header.index(COLUMN)
-        delays = [_delay(row, column, f"{path}:{rows.line_num}", longest) for row in rows]
+        delays = [_delay(row, column, len(header), f"{path}:{rows.line_num}", longest) for row in rows]
     except csv.Error as error:
         raise FormatError(f"{path}:{rows.line_num}", f"isn't CSV: {error}") from None
     if not delays:
@@ -423,7 +423,10 @@ def read_trace(path: Path, *, longest: float) -> tuple[float | None, ...]:
     return tuple(delays)
 
 
-def _delay(row: list[str], column: int, where: str, longest: float) -> float | None:
+def _delay(row: list[str], column: int, width: int, where: str, longest: float) -> float | None:
+    if len(row) != width and any(cell.strip() for cell in (row if len(row) < width else row[width:])):
+        # A decimal comma, or a line that was cut: neither is a delay, nor a lost packet.
+        raise FormatError(where, f"must have {width} cells, as the header has; has {len(row)}: {row[:8]}")
     cell = row[column].strip() if column < len(row) else ""
     if not cell:
         return None

@@ -72,6 +72,9 @@ def rerun(recording: Recording) -> Rerun:
     """
     again = Rerun(*begun(recording), recording.changes, recording.session.late)
     for entry in recording.commands:
+        if entry.number <= again.commands:
+            again.missing = f"command {entry.number} is there twice: what follows can't be run again"
+            break
         if entry.number != again.commands + 1:
             some = f"command {again.commands + 1} is" if entry.number == again.commands + 2 else (
                 f"commands {again.commands + 1} to {entry.number - 1} are"

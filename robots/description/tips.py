@@ -91,7 +91,9 @@ class _Tree:
                 )
             link, passed = first[0].child, passed + first[0].moves
         if not passed:
-            raise InvalidValueError("robot", self._description.name, "one with a joint that moves")
+            raise InvalidValueError(
+                "robot", self._description.name, "one with a joint that moves, and follows no other"
+            )
         # On to a flange or a tool's frame, while there's just one way.
         while len(self._below[link]) == 1 and self._below[link][0].kind is JointKind.FIXED:
             link = self._below[link][0].child

@@ -32,6 +32,8 @@ _KINDS: Final = {
     "spherical": JointKind.FIXED,
 }
 """Kinds of joints, as they're read."""
+_COUNTS: Final = {"xyz": 3, "rpy": 3, "size": 3, "rgba": 4}
+"""How many numbers an attribute of a link or joint has."""
 _VARIABLE: Final = re.compile(r"\$\(optenv\s+(\w+)\s*([^()]*)\)")
 """A variable of the environment, with its default."""
 
@@ -58,6 +60,7 @@ class _Reading:
         self._surfaces: dict[tuple[Path, tuple[float, ...]], meshes.Surface | str] = {}
         self._drop_unknown(root)
         self._take_defaults(root)
+        self._check_numbers(root)
         self._robot = self._parse(root)
         # A colour that one link gives a name counts for the others that name it.
         materials = [visual.material for link in self._robot.links for visual in link.visuals if visual.material]
@@ -110,6 +113,24 @@ class _Reading:
                 elif "${" in text or "$(" in text:
                     raise FormatError(self._where, f"{text!r} is left of xacro: give the .xacro file itself")
 
+    def _check_numbers(self, root: Any) -> None:
+        """Look at what the library would read however many numbers there are, and whatever they are."""
+        for part in [*root.findall("link"), *root.findall("joint")]:
+            for element in part.iter():
+                for name, count in _COUNTS.items():
+                    text = element.get(name)
+                    if text is None:
+                        continue
+                    try:
+                        good = [abs(float(word)) <= LARGEST_NUMBER for word in text.split()] == [True] * count
+                    except ValueError:
+                        good = False
+                    if not good:
+                        allowed = f"{name} must be {count} numbers within ±{LARGEST_NUMBER:g}"
+                        raise FormatError(
+                            self._where, f"{part.tag} {_name(part)!r}: {allowed}; given: {text[:80]!r}"
+                        )
+
     def _parse(self, root: Any) -> Any:
         """Let yourdfpy read it; if it can't, say of what."""
         try:
@@ -140,9 +161,14 @@ class _Reading:
         limit, dynamics = joint.limit, joint.dynamics
         limits = [None] * 4 if limit is None else [limit.lower, limit.upper, limit.velocity, limit.effort]
         for value in limits:
-            if value is not None and not np.isfinite(value):
-                self._say("{}: limits that aren't finite count as not said.", name)
-        lower, upper, velocity, effort = (None if v is None or not np.isfinite(v) else float(v) for v in limits)
+            if value is not None and not abs(value) <= LARGEST_NUMBER:
+                self._say(f"{{}}: limits that aren't within ±{LARGEST_NUMBER:g} count as not said.", name)
+        lower, upper, velocity, effort = (
+            None if v is None or not abs(v) <= LARGEST_NUMBER else float(v) for v in limits
+        )
+        for what, value in (("velocity", velocity), ("effort", effort)):
+            if value is not None and value < 0:
+                raise FormatError(self._where, f"{where}: {what} must be 0 or more; given: {value!r}")
         if kind in {JointKind.REVOLUTE, JointKind.PRISMATIC}:
             # One alone counts from 0, as URDF has it.
             if (lower is None) is not (upper is None):

@@ -76,5 +76,10 @@ if __name__ == "__main__":
     try:
         sys.stdout.write(_expand(Path(sys.argv[1]), _given))
     except Exception as error:  # noqa: BLE001 - what a stranger's file makes of it is said in a line
-        sys.stderr.write(f"{type(error).__name__}: {' '.join(str(error).split())}\n")
+        # xacro wraps what `share` raises in a text of its own, with its class and the file, which is said already.
+        ours: BaseException | None = error
+        while ours is not None and not isinstance(ours, FormatError):
+            ours = ours.__context__
+        said = f"{type(error).__name__}: {error}" if ours is None else ours.problem
+        sys.stderr.write(f"{' '.join(said.split())}\n")
         sys.exit(2)

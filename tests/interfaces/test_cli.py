@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
@@ -123,11 +124,55 @@ def test_a_list_of_commands_is_cut_nowhere(capsys, monkeypatch):
     assert not any(line.endswith("...") for line in capsys.readouterr().out.splitlines() if "Usage" not in line)
 
 
+def test_checks_of_a_driver_are_json_where_that_is_asked_for(capsys):
+    assert exit_status(["check", "--driver", "tests.robots.test_driver:Servos", "--json"]) == 2
+    (check,) = json.loads(capsys.readouterr().out)["checks"]
+    assert check == {"name": "works", "holds": False, "said": "the driver has 2 joints (one, two), the robot 6"}
+
+
+def test_a_worker_that_is_killed_is_a_line_and_no_bad_input(capsys, monkeypatch):
+    def broken(**_):
+        raise BrokenProcessPool
+
+    monkeypatch.setattr(sys.modules[exit_status.__module__], "app", broken)
+    assert exit_status(["lab"]) == 1
+    assert capsys.readouterr().err.startswith("vrs: a worker was ended")
+
+
 def test_help_and_version(capsys):
     for arguments in ([], ["--help"], ["demo", "--help"], ["doctor", "--help"]):
         assert exit_status(arguments) == 0
     assert exit_status(["--version"]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith("vrs-teleop ")
+
+
+def test_ctrl_c_while_the_robot_of_a_server_starts_is_no_traceback(tmp_path):
+    command = [sys.executable, "-m", "interfaces.cli", "serve", "--port", "0", "--body", "ideal"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path, text=True,
+                          env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}) as process:  # fmt: skip
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Traceback" not in said
+
+
+def test_ctrl_c_in_a_callback_that_nobody_hears_of_counts_all_the_same():
+    program = """if True:
+        import signal, sys, time, weakref
+        import interfaces.cli
+        door = sys.modules["interfaces.cli.main"]
+        class Lock: pass
+        def app(**_):
+            lock = Lock()
+            callback = weakref.ref(lock, lambda _: signal.raise_signal(signal.SIGINT))
+            del lock
+            time.sleep(30)
+        door.app = app
+        door.main(["demo"])
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20, check=False)
+    assert (done.returncode, done.stderr) == (130, "vrs: interrupted\n")
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])

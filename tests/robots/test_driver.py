@@ -143,6 +143,14 @@ def test_a_sound_driver_does_what_one_must() -> None:
     assert len(list(conformance(Servos, LIMITS, move=False))) == 5
 
 
+def test_a_driver_that_is_much_too_slow_is_found_out_soon() -> None:
+    driver = Servos()
+    driver.reading = lambda q: q if threading.Event().wait(0.6) else list(q)
+    checks = {check.name: check for check in conformance(lambda: driver, LIMITS, move=False)}
+    assert checks["reads its joints"].said == "0 of 2 calls failed"
+    assert not checks["keeps its rate"].holds
+
+
 def stuck(driver: Servos) -> None:
     driver.writing = lambda q: [q[0], HOME[1]]
 

@@ -366,7 +366,7 @@ def read_inputs(path: Path) -> RecordedOperator:
         FormatError: If it can't be read as such, with the line.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             header = next(reader, [])
             if header != ["t", "v", "w"]:

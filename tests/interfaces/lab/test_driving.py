@@ -63,7 +63,8 @@ def test_a_seed_drives_the_same_and_another_otherwise() -> None:
 
 def test_recorded_inputs_are_driven_as_they_were(tmp_path: Path) -> None:
     file = tmp_path / "inputs.csv"
-    file.write_text("t,v,w\n0,0,0\n0.5,0.05,0\n1.5,0,0.2\n2,0,0\n", encoding="utf-8")
+    # As a spreadsheet writes it, with a mark before its first column.
+    file.write_text("t,v,w\n0,0,0\n0.5,0.05,0\n1.5,0,0.2\n2,0,0\n", encoding="utf-8-sig")
     drive = run(DriveCase(delay="none", robot="bare", operator=f"inputs:{file}", length=6.0, reality=IDEAL))
     x, y, theta = drive.virtual[-1]
     assert (x, y, theta) == pytest.approx((0.05, 0.0, 0.1), abs=1e-9)

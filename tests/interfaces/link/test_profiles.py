@@ -145,6 +145,7 @@ def test_the_load_of_a_route_is_correlated_as_asked():
         ("delay_s\n0.1\n\n0.3\n", (0.1, None, 0.3)),
         ("delay_s\r\n0.1\r\n\r\n0.3\r\n", (0.1, None, 0.3)),
         ("delay_s\n\n0.3", (None, 0.3)),
+        ("delay_s,\n0.1,\n,\n0.3,,\n", (0.1, None, 0.3)),
         ("\ufeffseq,delay_s\n1,0.1\n2,\n3,0.3\n\n", (0.1, None, 0.3, None)),
     ],
 )
@@ -161,7 +162,7 @@ def test_an_empty_cell_or_line_is_a_lost_packet(tmp_path, text, delays):
     [
         (b"", ":1"), (b"delay\n1\n", ":1"), (b"delay_s\n", ""), (b"delay_s\n0.1\nx\n", ":3"),
         (b"delay_s\n-1\n", ":2"), (b"delay_s\nnan\n", ":2"), (b"\xff\xfe\x00", ""), (b'delay_s\n"0.1', ""),
-        (b"\x89PNG\r\n\x1a\n\x00", ""),
+        (b"\x89PNG\r\n\x1a\n\x00", ""), (b"delay_s\n0,04\n", ":2"), (b"seq,delay_s\n1,0.1\n2\n", ":3"),
     ],
 )  # fmt: skip
 def test_bad_traces_name_file_and_line(tmp_path, data, line):

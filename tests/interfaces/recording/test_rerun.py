@@ -137,6 +137,14 @@ def test_what_follows_a_missing_command_is_not_run_again(tmp_path):
     assert whole.missing == ""
 
 
+def test_what_follows_a_command_that_is_there_twice_is_not_run_again(tmp_path):
+    told(tmp_path / "run.mcap")
+    with open_recording(tmp_path / "run.mcap") as recording:
+        twice = Without(recording, None)
+        twice.commands = recording.commands * 2
+        assert rerun(twice).missing == "command 1 is there twice: what follows can't be run again"
+
+
 def test_an_altered_coefficient_is_found(tmp_path):
     told(tmp_path / "run.mcap")
     with open_recording(tmp_path / "run.mcap") as recording:

@@ -334,7 +334,11 @@ def pair(link: str = "", kind: str = "revolute", joint: str = "") -> str:
         (pair(BOX.format("1 -1 1")), "sizes must be positive"),
         (pair(MESH.format("0 1 1")), "scale must not be 0"),
         (pair(MESH.format("1 1")), "link 'b': must have 3 numbers"),
-        (pair(joint="<origin xyz='inf 0 0'/>"), "joint 'j': must have 4 × 4 numbers"),
+        (pair(joint="<origin xyz='inf 0 0'/>"), "'j': xyz must be 3 numbers within ±1e+09; given: 'inf 0 0'"),
+        (pair(joint="<origin xyz='0 zero 0'/>"), "'j': xyz must be 3 numbers within ±1e+09; given: '0 zero 0'"),
+        (pair(joint="<origin xyz='0 0 1' rpy='0 0'/>"), "joint 'j': rpy must be 3 numbers"),
+        (pair(joint="<limit lower='-1' upper='1' velocity='-2' effort='1'/>"), "velocity must be 0 or more"),
+        (pair(joint="<limit lower='-1' upper='1' velocity='2' effort='-1'/>"), "effort must be 0 or more"),
         (pair(joint="<origin xyz='${x} 0 0'/>"), "left of xacro"),
         pytest.param(
             "<mujoco><worldbody><body><geom/></body></worldbody></mujoco>", "Error",
@@ -445,9 +449,18 @@ def test_xacro_takes_arguments_and_finds_packages_and_its_errors_are_a_line(tmp_
     (path.parent / "r.vrs.toml").write_text('arguments.mass = "5"')
     assert read(path).links["a"].mass == 10.0
     path.write_text(XACRO.replace("parts", "others"))
-    with pytest.raises(FormatError, match=r"xacro: .*there's no package others above it or beside it") as error:
+    with pytest.raises(FormatError, match=r"xacro: .*there's no package others above it or beside it$") as error:
         read(path)
     assert "\n" not in str(error.value)
+    assert str(error.value).count("others") == 1
+
+
+def test_limits_that_no_number_here_may_have_count_as_not_said(tmp_path: Path) -> None:
+    path = tmp_path / "far.urdf"
+    path.write_text(pair(joint="<limit lower='-1e20' upper='1e20' velocity='2' effort='1'/>"))
+    description = read(path)
+    assert (description.joints[0].q_min, description.joints[0].qd_max) == (None, 2.0)
+    assert "j: limits that aren't within ±1e+09 count as not said." in description.notes
 
 
 def test_urdf_is_read_whatever_its_file_is_called_and_mimics_in_a_circle_are_fixed(tmp_path: Path) -> None:
