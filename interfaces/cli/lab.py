@@ -10,15 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import PROFILES, Workers, argument, bars, option
+from interfaces.cli.options import PROFILES, On, Resume, Workers, argument, bars, option, sweeping
 from interfaces.cli.reproduce import measured, show
 from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from contextlib import AbstractContextManager
 
+    from interfaces.lab.finished import FinishedRows
     from interfaces.lab.runner import Calls, Made
+    from interfaces.lab.runner import Workers as Who
 
 LOCALIZATION, GOALS, CONTROL = "localization", "goals", "control"
 """What the command line calls them."""
@@ -43,7 +46,7 @@ def study(
     length: float | None,
     starts: int | None,
     operators: Sequence[str] | None,
-    workers: int,
+    sweep: AbstractContextManager[tuple[Who, FinishedRows]],
     *,
     as_json: bool,
 ) -> None:
@@ -58,7 +61,7 @@ def study(
         length: Of a drive in a room [s]; 60 if None.
         starts: From which a robot that knows nothing is found; 200 if None.
         operators: Who see the real robot in `CONTROL`; those that come with it if None.
-        workers: Processes at once.
+        sweep: Who measures, and where finished cases are kept, once it's entered.
         as_json: Whether JSON goes to standard output, instead of tables.
     """
     from interfaces.lab import Study
@@ -78,8 +81,9 @@ def study(
         asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
         paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
     prepare(out, "runs.csv", "summary.json")
-    (found,) = measured([(paper, asked)], workers)
-    write(found, out)
+    with sweep as (workers, finished):
+        (found,) = measured([(paper, asked)], workers, finished)
+        write(found, out)
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:
@@ -87,6 +91,7 @@ def study(
 
 
 def lab(
+    ctx: typer.Context,
     out: Annotated[Path, option("DIR", "Where runs.csv, summary.json and figures go.")],
     what: Annotated[
         str,
@@ -147,6 +152,8 @@ def lab(
         option("S", "For how long the operator drives [s]; 120, of localization 60.", min=2, max=3600),
     ] = None,
     workers: Workers = 2,
+    on: On = "",
+    resume: Resume = False,
     record: Annotated[
         bool, option("--record", "Keep each run as runs/NAME.mcap in DIR; changes no figure.")
     ] = False,
@@ -158,6 +165,7 @@ def lab(
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
     from vrs.checks import one_of
 
+    sweep = sweeping(ctx, out, workers, on, resume=resume)
     if what:
         one_of("experiment", what, (LOCALIZATION, GOALS, CONTROL))
         others: dict[str, object] = {
@@ -171,7 +179,7 @@ def lab(
         else:
             others["--operator"] = operator
         refuse(what, others)
-        study(what, out, seed, runs, length, starts, operator, workers, as_json=as_json)
+        study(what, out, seed, runs, length, starts, operator, sweep, as_json=as_json)
         return
     refuse("the architectures", {"--starts": starts})
     runs, length = runs or 5, length or 120.0
@@ -217,19 +225,22 @@ def lab(
     chosen = [replace(case, position=position) for case in combined]
     files = paths(chosen, out) if record else [None] * len(chosen)
     calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
-    measured: list[tuple[Row, DriveRun | None, str]] = _worked(calls, "runs", workers)
-    rows, drives, problems = map(list, zip(*measured, strict=True))
-    causes = []
-    if attribution:
-        taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
-        causes = attributions(chosen, _worked(taken, "causes", workers))
     settings = {
         "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
         "robots": robots, "operators": operators, "position": position, "runs": runs, "seed": seed,
         "length_s": length,
     }  # fmt: skip
-    found = summary(rows, settings, causes)
-    write(rows, found, pictures([drive for drive in drives if drive is not None]), out)
+    causes = []
+    with sweep as who_works:
+        measured: list[tuple[Row, DriveRun | None, str]] = _worked(calls, "runs", *who_works)
+        rows, drives, problems = map(list, zip(*measured, strict=True))
+        if attribution:
+            taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
+            causes = attributions(chosen, _worked(taken, "causes", *who_works))
+        found = summary(rows, settings, causes)
+        write(rows, found, pictures([drive for drive in drives if drive is not None]), out)
+    if any(path is not None and not path.exists() for path in files) and not any(problems):
+        problems.append(f"{out / 'runs'} lacks recordings: workers elsewhere write them to their own directory")
     for problem in dict.fromkeys(filter(None, problems)):
         typer.echo(f"vrs: {problem}", err=True)
     if as_json:
@@ -255,9 +266,9 @@ def _once(name: str, given: Sequence[object]) -> None:
         raise InvalidValueError(name, ", ".join(map(str, given)), "named once each")
 
 
-def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:
+def _worked(calls: Calls[Made], what: str, workers: Who, finished: FinishedRows) -> list[Made]:
     from interfaces.lab.runner import pooled
 
     with bars(what) as bar:
-        task = bar.add_task(what, total=len(calls))
-        return pooled(calls, workers=workers, progress=lambda _: bar.advance(task))
+        task = bar.add_task(what, total=len(calls), completed=finished.ready(calls))
+        return pooled(calls, workers=workers, finished=finished, progress=lambda _: bar.advance(task))
