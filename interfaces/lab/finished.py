@@ -1,6 +1,6 @@
 """Finished calls of a sweep, kept as files: what each returned, and where, by its arguments and our version.
 
-What is kept is plain data in msgpack (numbers, texts, arrays, our own dataclasses by name): nothing in a file is
+What is kept is plain data in msgpack (numbers, texts, arrays, our own values by name): nothing in a file is
 run when it's read, whoever wrote it.
 """
 
@@ -10,6 +10,7 @@ import csv
 import hashlib
 import platform
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -18,7 +19,6 @@ from functools import cache, partial
 from importlib import import_module, metadata, resources, util
 from itertools import starmap
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
 import msgspec
@@ -211,15 +211,15 @@ def packed(value: Any) -> Any:
 
     Raises:
         TypeError: If it is, or holds, something else than numbers, texts, arrays, enums, paths, tuples, lists,
-            dicts, and dataclasses of ours.
+            dicts, and our own classes that are nothing but their fields.
     """
     kind = type(value)
     if value is None or kind in {bool, int, float, str, bytes}:
         return value
     if kind is list:
         return list(map(packed, value))
-    if kind is dict:
-        return {"dict": [[packed(key), packed(one)] for key, one in value.items()]}
+    if kind is dict or kind is Counter:
+        return {kind.__name__: [[packed(key), packed(one)] for key, one in value.items()]}
     if kind is np.ndarray and not value.dtype.hasobject and not value.dtype.names:
         order = "F" if np.isfortran(value) else "C"
         return {"array": [value.dtype.str, list(value.shape), order, value.tobytes(order)]}
@@ -238,7 +238,10 @@ def packed(value: Any) -> Any:
         return {"tuple": [name, *map(packed, value)]}
     if not _has_fields(kind):
         raise TypeError(f"{name} can't be kept")
-    names = [item.name for item in fields(value)] if is_dataclass(value) else list(vars(value))
+    if isinstance(value, msgspec.Struct):
+        names = list(value.__struct_fields__)
+    else:
+        names = [item.name for item in fields(value)] if is_dataclass(value) else list(vars(value))
     return {"fields": [name, *([each, packed(getattr(value, each))] for each in names)]}
 
 
@@ -272,13 +275,15 @@ def _class_of(name: str, is_kind: Callable[[type], bool]) -> type:
             found = import_module(module)
         for part in path.split("."):
             found = getattr(found, part, None)
-    if not isinstance(found, type) or not is_kind(found):
+    if not isinstance(found, type) or found.__module__ != module or not is_kind(found):
         raise FormatError(name, "is no class of what is kept")
     return found
 
 
 def _has_fields(kind: type) -> bool:
-    return is_dataclass(kind) or issubclass(kind, SimpleNamespace)
+    """Whether a class is nothing but its fields: nothing of it runs when one is made so, or goes."""
+    is_plain = is_dataclass(kind) or issubclass(kind, msgspec.Struct)
+    return is_plain or (kind.__dictoffset__ != 0 and not hasattr(kind, "__del__"))
 
 
 def _array(parts: Any) -> Any:
@@ -307,14 +312,19 @@ def _enum(parts: Any) -> Any:
 def _fields(parts: Any) -> Any:
     name, *items = parts
     kind: Any = _class_of(name, _has_fields)
+    values = {each: unpacked(value) for each, value in items}
+    if issubclass(kind, msgspec.Struct):
+        # Nothing makes one without its fields; it checks them, and does nothing else.
+        return kind(**values)
     made: object = kind.__new__(kind)
-    for each, value in items:
-        object.__setattr__(made, each, unpacked(value))
+    for each, value in values.items():
+        object.__setattr__(made, each, value)
     return made
 
 
 _MAKES: Final[dict[str, Callable[[Any], Any]]] = {
     "dict": lambda items: {unpacked(key): unpacked(value) for key, value in items},
+    "Counter": lambda items: Counter({unpacked(key): unpacked(value) for key, value in items}),
     "array": _array,
     "scalar": lambda parts: np.frombuffer(parts[1], _dtype(parts[0]))[0],
     "path": Path,

@@ -83,7 +83,6 @@ def test_the_order_of_an_arrays_memory_is_kept() -> None:
         {"fields": ["os:environ"]},
         {"fields": ["subprocess:Popen", ["args", "true"]]},
         {"fields": ["interfaces.system:Path"]},
-        {"fields": ["interfaces.recording.mcap_file:McapFile", ["path", "x"]]},
         {"fields": ["interfaces.cli.__main__:main"]},
         {"tuple": ["interfaces.lab.claims:Results", 1]},
         {"enum": ["interfaces.lab.claims:Verdict", "no such"]},
