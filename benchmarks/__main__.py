@@ -19,6 +19,7 @@ PARTS = (
 DETAILS = (
     "timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera", "recordings",
     "entered", "altering", "classroom", "inverse", "datagrams",
+    "cluster",
 )  # fmt: skip
 """Benchmarks that print more about one thing."""
 

@@ -21,7 +21,9 @@ from vrs.errors import InvalidValueError, VrsError
 SCHEDULERS: Final = ("tcp://", "tls://", "ws://", "wss://")
 """How a Dask scheduler's address begins."""
 TIMEOUT: Final = 8.0
-"""A scheduler, and whoever it has, answers within this time [s]."""
+"""A scheduler answers within this time [s]."""
+FIRST_WORKER: Final = 30.0
+"""So long a scheduler is waited for that has no worker yet, as one that was started just before [s]."""
 CLOSING: Final = 2.0
 """So long it's waited for connections to end [s]."""
 RETRIES: Final = 2
@@ -166,9 +168,9 @@ def _compare(client: Any, address: str) -> None:
 
     here = look()
     try:
-        client.wait_for_workers(1, timeout=TIMEOUT)
+        client.wait_for_workers(1, timeout=FIRST_WORKER)
     except TimeoutError:
-        raise InvalidValueError("on", address, f"a scheduler that has a worker within {TIMEOUT:g} s") from None
+        raise InvalidValueError("on", address, f"a scheduler that has a worker within {FIRST_WORKER:g} s") from None
     there = {f"the scheduler at {address}": client.run_on_scheduler(look)}
     there |= {f"the worker at {worker}": found for worker, found in client.run(look).items()}
     for who, found in there.items():

@@ -60,10 +60,9 @@ def planned(settings: Mapping[str, Any], runs: int, kept: int, each: float, work
     seeds, left = settings["runs"], (runs - kept) * each
     shared = f", {span(left / workers)} on {workers}" if workers is not None and workers > 1 else ""
     plan = f"{' × '.join(axes)} × {seeds} seed{'s' if seeds > 1 else ''} = {runs:,} runs, {kept:,} of them finished"
-    return [
-        plan,
-        *([f"one took {each:.2f} s here: about {span(left)} on one worker{shared}"] if kept < runs else []),
-    ]
+    if kept == runs:
+        return [plan]
+    return [plan, f"one took {each:.2f} s here: about {span(left)} on one worker{shared}"]
 
 
 def write_table(rows: Sequence[KeptRow], out: Path) -> Path:

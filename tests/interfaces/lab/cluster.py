@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,20 +26,29 @@ class Cluster:
         file = place / "scheduler.json"
         options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
         self.scheduler = self._start("scheduler", *options)
-        deadline = time.monotonic() + SECONDS
-        while not file.exists():
-            assert time.monotonic() < deadline
-            assert self.scheduler.poll() is None
-            time.sleep(0.05)
+        self._until(file.exists)
         self.address: str = json.loads(file.read_text())["address"]
         self.workers: list[subprocess.Popen[bytes]] = []
         for _ in range(workers):
             self.add_worker()
+        self.wait()
 
     def add_worker(self) -> None:
         """Start another worker, of one thread."""
         options = ["--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(self.place)]
         self.workers.append(self._start("worker", self.address, *options))
+
+    def wait(self) -> None:
+        """Wait until the scheduler knows all workers."""
+        log = self.place / "worker.log"
+        self._until(lambda: not self.workers or log.read_text().count("Registered to") >= len(self.workers))
+
+    def _until(self, there: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + SECONDS
+        while not there():
+            assert time.monotonic() < deadline
+            assert self.scheduler.poll() is None
+            time.sleep(0.05)
 
     def _start(self, what: str, *options: str) -> subprocess.Popen[bytes]:
         log = (self.place / f"{what}.log").open("ab")

@@ -111,11 +111,11 @@ class TestDask:
     ) -> None:
         path = os.pathsep.join([str(HOUSE / "tests" / "without"), str(HOUSE)])
         with cluster(tmp_path, 0, PYTHONPATH=path, VRS_WITHOUT=",".join(finished.PACKAGES)) as made:
-            monkeypatch.setattr(executors, "TIMEOUT", 2.0)
+            monkeypatch.setattr(executors, "FIRST_WORKER", 1.0)
             with pytest.raises(InvalidValueError, match="a scheduler that has a worker"), executor(made.address):
                 pass
             made.add_worker()
-            monkeypatch.setattr(executors, "TIMEOUT", 30.0)
+            made.wait()
             with pytest.raises(WorkerVersionError, match="hasn't got vrs-teleop"), executor(made.address):
                 pass
 
