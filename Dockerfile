@@ -8,7 +8,9 @@ COPY vrs vrs
 COPY robots robots
 COPY interfaces interfaces
 COPY .ci/install.py .ci/
-RUN PIP_NO_CACHE_DIR=1 python .ci/install.py .
+# docker build --build-arg EXTRAS="cluster parquet": for sweeps on many machines, docs/howto/cluster.md.
+ARG EXTRAS=""
+RUN PIP_NO_CACHE_DIR=1 python .ci/install.py . $EXTRAS
 
 COPY examples /data/examples
 USER vrs

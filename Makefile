@@ -96,7 +96,8 @@ $(BENCH_STAMP): $(STAMP)
 	$(INSTALL) bench
 	@touch $@
 
-# A million random edits of every kind, each held to every law; VRS_SOAK_EDITS and VRS_SOAK_SEED change what is drawn.
+# A million random edits of every kind, each held to every law; VRS_SOAK_EDITS and VRS_SOAK_SEED change what is drawn,
+# VRS_SOAK_ON=tcp://HOST:8786 has other machines' workers, which are started in a checkout, make the edits.
 # A million packets of RSP over ten bad links, against a model; a million fuzzed datagrams for each core.
 soak: export VRS_SOAK_EDITS ?= 1000000
 soak: $(DEV_STAMP)

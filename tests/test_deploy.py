@@ -1,4 +1,4 @@
-"""The units and the compose file: their hardening, and that their command lines run and end as they're told.
+"""Units, compose files and manifest: their hardening, and that their command lines run and end as they're told.
 
 systemd itself isn't run here: what it makes of a unit is what `systemd-analyze` says of it.
 """
@@ -17,10 +17,13 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
+import typer
 import yaml
+
+from interfaces.cli.main import app
 
 DEPLOY = Path(__file__).resolve().parents[1] / "deploy"
 UNITS = ("vrs-serve.service", "vrs-robot.service")
@@ -240,3 +243,89 @@ def test_no_system_call_is_made_that_a_unit_forbids(name: str, tmp_path: Path) -
     made = set(re.findall(r"(?m)^\d+ +([a-z_0-9]+)\(", traced.read_text(errors="replace")))
     assert len(made) > 50
     assert made - allowed == set()
+
+
+CLUSTER: Final = ("scheduler", "worker", "sweep")
+
+
+def documents() -> list[dict[str, Any]]:
+    """What the Kubernetes manifest has."""
+    return list(yaml.safe_load_all((DEPLOY / "kubernetes.yaml").read_text()))
+
+
+def containers() -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
+    """Its containers by their names, each with its pod's settings."""
+    pods = [each["spec"]["template"]["spec"] for each in documents() if "template" in each["spec"]]
+    return {one["name"]: (one, pod) for pod in pods for one in pod["containers"]}
+
+
+def cluster_command(name: str, file: str) -> list[str]:
+    """What a service of the compose file, or a container of the manifest, runs."""
+    if file == "kubernetes.yaml":
+        return [str(word) for word in containers()[name][0]["command"]]
+    services = yaml.safe_load((DEPLOY / file).read_text())["services"]
+    return [str(word) for word in services[name]["command"]]
+
+
+@pytest.mark.parametrize("file", ["cluster.yaml", "kubernetes.yaml"])
+@pytest.mark.parametrize("name", CLUSTER)
+def test_a_clusters_command_is_one(name: str, file: str) -> None:
+    program, what, *options = cluster_command(name, file)
+    if program == "vrs":
+        lab = typer.main.get_command(app).commands[what].make_context(what, options).params  # type: ignore[attr-defined]
+        # A container that was ended goes on, where it's kept.
+        assert lab["resume"]
+        assert str(lab["out"]).startswith("/data/")
+        assert lab["on"].endswith(":8786")
+        return
+    assert program == "dask"
+    module = pytest.importorskip(f"distributed.cli.dask_{what}")
+    found = module.main.make_context(what, options).params
+    if what == "scheduler":
+        assert found["port"] == "8786"
+    else:
+        # A process makes one run at a time.
+        assert found["nthreads"] == 1
+        assert found["scheduler"].endswith(":8786")
+
+
+@pytest.mark.parametrize("name", CLUSTER)
+def test_t19_a_clusters_container_gives_up_what_it_doesnt_need(name: str) -> None:
+    compose = yaml.safe_load((DEPLOY / "cluster.yaml").read_text())
+    found = compose["services"][name]
+    assert found["read_only"] is True
+    assert found["cap_drop"] == ["ALL"]
+    assert found["security_opt"] == ["no-new-privileges:true"]
+    assert found["user"] == "1000:1000"
+    # Dask asks nobody for a token: nobody else is on its network.
+    assert found["networks"] == ["sweep"]
+    assert compose["networks"]["sweep"]["internal"] is True
+    assert "ports" not in found
+    one, pod = containers()[name]
+    assert pod["securityContext"]["runAsNonRoot"] is True
+    assert pod["automountServiceAccountToken"] is False
+    assert one["securityContext"] == {
+        "allowPrivilegeEscalation": False, "readOnlyRootFilesystem": True, "capabilities": {"drop": ["ALL"]},
+    }  # fmt: skip
+    assert {mount["name"] for mount in one["volumeMounts"]} == {volume["name"] for volume in pod["volumes"]}
+
+
+def test_the_manifests_parts_find_each_other() -> None:
+    by_kind: dict[str, list[dict[str, Any]]] = {}
+    for each in documents():
+        assert {"apiVersion", "kind", "metadata", "spec"} == set(each)
+        by_kind.setdefault(each["kind"], []).append(each)
+    for each in by_kind["Deployment"]:
+        labels = each["spec"]["template"]["metadata"]["labels"]
+        assert each["spec"]["selector"]["matchLabels"].items() <= labels.items()
+    (service_,) = by_kind["Service"]
+    named = {port["name"] for port in containers()["scheduler"][0]["ports"]}
+    assert {port["targetPort"] for port in service_["spec"]["ports"]} == named
+    assert f"tcp://{service_['metadata']['name']}:8786" in cluster_command("worker", "kubernetes.yaml")
+    (job,), (claim,), (policy,) = by_kind["Job"], by_kind["PersistentVolumeClaim"], by_kind["NetworkPolicy"]
+    volumes = job["spec"]["template"]["spec"]["volumes"]
+    assert {"name": "data", "persistentVolumeClaim": {"claimName": claim["metadata"]["name"]}} in volumes
+    pods = [each["spec"]["template"] for each in (*by_kind["Deployment"], job)]
+    wanted = policy["spec"]["podSelector"]["matchLabels"].items()
+    assert all(wanted <= pod["metadata"]["labels"].items() for pod in pods)
+    assert len({one["image"] for one, _ in containers().values()}) == 1

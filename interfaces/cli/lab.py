@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import PROFILES, Workers, argument, bars, option
+from interfaces.cli.options import PROFILES, On, Resume, Workers, argument, bars, option, sweeping
 from interfaces.cli.reproduce import measured, show
 from robots.robot import BARE, USUAL_BASE
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from contextlib import AbstractContextManager
 
-    from interfaces.lab.runner import Calls, Made
+    from interfaces.lab.finished import FinishedRows, KeptRow
+    from interfaces.lab.runner import Calls
+    from interfaces.lab.runner import Workers as Who
+    from interfaces.runs.drive_run import DriveCase
 
-LOCALIZATION, GOALS, CONTROL = "localization", "goals", "control"
+LOCALIZATION, GOALS, CONTROL, SWEEP = "localization", "goals", "control", "sweep"
 """What the command line calls them."""
 
 
@@ -43,7 +47,7 @@ def study(
     length: float | None,
     starts: int | None,
     operators: Sequence[str] | None,
-    workers: int,
+    sweep: AbstractContextManager[tuple[Who, FinishedRows]],
     *,
     as_json: bool,
 ) -> None:
@@ -58,7 +62,7 @@ def study(
         length: Of a drive in a room [s]; 60 if None.
         starts: From which a robot that knows nothing is found; 200 if None.
         operators: Who see the real robot in `CONTROL`; those that come with it if None.
-        workers: Processes at once.
+        sweep: Who measures, and where finished cases are kept, once it's entered.
         as_json: Whether JSON goes to standard output, instead of tables.
     """
     from interfaces.lab import Study
@@ -78,22 +82,72 @@ def study(
         asked = Study(seed, rooms.ROOMS if runs is None else runs, rooms.LENGTH if length is None else length)
         paper, write = rooms.study_of(asked.runs, rooms.FULL_STARTS if starts is None else starts), rooms.write
     prepare(out, "runs.csv", "summary.json")
-    (found,) = measured([(paper, asked)], workers)
-    write(found, out)
+    with sweep as (workers, finished):
+        (found,) = measured([(paper, asked)], workers, finished)
+        write(found, out)
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:
         show(found, out / "summary.json")
 
 
+def swept(
+    chosen: Sequence[DriveCase],
+    settings: dict[str, Any],
+    out: Path,
+    sweep: AbstractContextManager[tuple[Who, FinishedRows]],
+    *,
+    only_plan: bool,
+    as_json: bool,
+) -> None:
+    """Say what a design sweep costs, run it; write runs.parquet or runs.csv, summary.json and sweep.html.
+
+    Args:
+        chosen: Its cases.
+        settings: What they are made of, for the summary.
+        out: Where the files go.
+        sweep: Who runs them, and where finished ones are kept, once it's entered.
+        only_plan: Whether nothing is run but the one that the cost is measured by.
+        as_json: Whether the summary goes to standard output, too.
+    """
+    import json
+    from time import perf_counter
+
+    from interfaces.lab.driving.design import planned, write_table
+    from interfaces.lab.driving.output import summary
+    from interfaces.lab.driving.sweep import measure
+    from interfaces.lab.output import write_files
+    from interfaces.report.surface import PAGE, write_sweep
+
+    calls = [(measure, (case,)) for case in chosen]
+    prepare(out, "runs.parquet", "runs.csv", "summary.json", PAGE)
+    with sweep as (who, finished):
+        kept, begun = finished.ready(calls), perf_counter()
+        if kept < len(calls):
+            measure(chosen[0])
+        each = perf_counter() - begun
+        for line in planned(settings, len(calls), kept, each, who if isinstance(who, int) else None):
+            typer.echo(line, err=True)
+        if only_plan:
+            return
+        rows = _worked(calls, "runs", who, finished)
+        found = summary([row.value for row in rows], settings)
+        text = json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        write_files(out, (), {"summary.json": text})
+        table, shown = write_table(rows, out), write_sweep(found, out)
+    typer.echo(text, nl=False) if as_json else typer.echo(f"Wrote {shown}, summary.json and {table.name}")
+
+
 def lab(
+    ctx: typer.Context,
     out: Annotated[Path, option("DIR", "Where runs.csv, summary.json and figures go.")],
     what: Annotated[
         str,
         argument(
-            "localization|goals|control",
+            "localization|goals|control|sweep",
             "How well the robot knows where it is, whether it gets where it's told to go, or what it's worth to see"
-            " the virtual robot, instead of the architectures.",
+            " the virtual robot, instead of the architectures; or, of many of those under many networks, which one"
+            " wins where, as Parquet and one page.",
         ),
     ] = "",
     architecture: Annotated[
@@ -107,6 +161,10 @@ def lab(
     transport: Annotated[list[str] | None, option("T", "stream or datagrams (unless given); repeatable.")] = None,
     delay: Annotated[
         list[str] | None, option("PROFILE", f"Delay one way, thu unless given; repeatable: {PROFILES}")
+    ] = None,
+    correlation: Annotated[
+        list[float] | None,
+        option("S", "Correlation time of delays that have one [s], as thu@20 has; repeatable.", min=0, max=3600),
     ] = None,
     robot: Annotated[
         list[str] | None,
@@ -147,6 +205,11 @@ def lab(
         option("S", "For how long the operator drives [s]; 120, of localization 60.", min=2, max=3600),
     ] = None,
     workers: Workers = 2,
+    on: On = "",
+    resume: Resume = False,
+    plan: Annotated[
+        bool, option("--plan", "Of sweep: say what would be run and what it would cost, and end.")
+    ] = False,
     record: Annotated[
         bool, option("--record", "Keep each run as runs/NAME.mcap in DIR; changes no figure.")
     ] = False,
@@ -158,11 +221,13 @@ def lab(
     """Measure path error and time difference of a mobile robot under networks, architectures and operators."""
     from vrs.checks import one_of
 
-    if what:
-        one_of("experiment", what, (LOCALIZATION, GOALS, CONTROL))
+    sweep = sweeping(ctx, out, workers, on, resume=resume)
+    if what not in ("", SWEEP):
+        one_of("experiment", what, (LOCALIZATION, GOALS, CONTROL, SWEEP))
         others: dict[str, object] = {
             "--architecture": architecture, "--transport": transport, "--delay": delay, "--robot": robot,
-            "--position": position, "--attribution": attribution, "--record": record,
+            "--position": position, "--attribution": attribution, "--record": record, "--plan": plan,
+            "--correlation": correlation,
         }  # fmt: skip
         if what != LOCALIZATION:
             others |= {"--length": length, "--starts": starts}
@@ -171,10 +236,14 @@ def lab(
         else:
             others["--operator"] = operator
         refuse(what, others)
-        study(what, out, seed, runs, length, starts, operator, workers, as_json=as_json)
+        study(what, out, seed, runs, length, starts, operator, sweep, as_json=as_json)
         return
-    refuse("the architectures", {"--starts": starts})
+    if what == SWEEP:
+        refuse(what, {"--starts": starts, "--attribution": attribution, "--record": record})
+    else:
+        refuse("the architectures", {"--starts": starts, "--plan": plan})
     runs, length = runs or 5, length or 120.0
+    from interfaces.lab.driving.design import delays_of
     from interfaces.lab.driving.operators import operator as make
     from interfaces.lab.driving.output import (
         attributions,
@@ -187,7 +256,6 @@ def lab(
     )
     from interfaces.lab.driving.run import measure_recorded, paths
     from interfaces.lab.driving.sweep import attributed, cases
-    from interfaces.link.delays import delay_profile
     from interfaces.runs.drive_run import DriveCase, DriveRun, Row
     from interfaces.teleop.architectures import Constants, Transport, controller
     from interfaces.teleop.architectures.compositions import POSITIONS
@@ -195,7 +263,8 @@ def lab(
 
     architectures = architecture or ["III", "timeline"]
     transports = [Transport(one_of("transport", t, list(Transport))) for t in transport or ["datagrams"]]
-    delays, robots = delay or ["thu"], [DriveCase(robot=r).robot for r in robot or [USUAL_BASE]]
+    delays = delays_of(delay or ["thu"], correlation or [])
+    robots = [DriveCase(robot=r).robot for r in robot or [USUAL_BASE]]
     operators, position = operator or ["mixed"], one_of("position", position or "fused", POSITIONS)
     combined_of: dict[str, Sequence[object]] = {
         "architecture": architectures, "transport": transports, "delay": delays, "robot": robots,
@@ -203,33 +272,38 @@ def lab(
     }  # fmt: skip
     for what_given, given in combined_of.items():
         _once(what_given, given)
-    for profile in delays:
-        delay_profile(profile)
     for name in architectures:
         controller(name, Posture(0.0, 0.0, 0.0), Constants())
     for who in operators:
         make(who, seed, 0.1)
-    prepare(out, "runs.csv", "summary.json", "paths.svg", "errors.svg")
-    if record:
-        prepare(out / "runs")
     seeds = range(seed, seed + runs)
     combined = cases(architectures, transports, delays, robots, operators, seeds, length)
     chosen = [replace(case, position=position) for case in combined]
-    files = paths(chosen, out) if record else [None] * len(chosen)
-    calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
-    measured: list[tuple[Row, DriveRun | None, str]] = _worked(calls, "runs", workers)
-    rows, drives, problems = map(list, zip(*measured, strict=True))
-    causes = []
-    if attribution:
-        taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
-        causes = attributions(chosen, _worked(taken, "causes", workers))
     settings = {
         "architectures": architectures, "transports": [t.value for t in transports], "delays": delays,
         "robots": robots, "operators": operators, "position": position, "runs": runs, "seed": seed,
         "length_s": length,
     }  # fmt: skip
-    found = summary(rows, settings, causes)
-    write(rows, found, pictures([drive for drive in drives if drive is not None]), out)
+    if what == SWEEP:
+        swept(chosen, settings, out, sweep, only_plan=plan, as_json=as_json)
+        return
+    prepare(out, "runs.csv", "summary.json", "paths.svg", "errors.svg")
+    if record:
+        prepare(out / "runs")
+    files = paths(chosen, out) if record else [None] * len(chosen)
+    calls = [(measure_recorded, given) for given in zip(chosen, drawn(chosen), files, strict=True)]
+    causes = []
+    with sweep as who_works:
+        measured: list[tuple[Row, DriveRun | None, str]]
+        measured = [row.value for row in _worked(calls, "runs", *who_works)]
+        rows, drives, problems = map(list, zip(*measured, strict=True))
+        if attribution:
+            taken = [(attributed, (case, row.metrics)) for case, row in zip(chosen, rows, strict=True)]
+            causes = attributions(chosen, [row.value for row in _worked(taken, "causes", *who_works)])
+        found = summary(rows, settings, causes)
+        write(rows, found, pictures([drive for drive in drives if drive is not None]), out)
+    if any(path is not None and not path.exists() for path in files) and not any(problems):
+        problems.append(f"{out / 'runs'} lacks recordings: workers elsewhere write them to their own directory")
     for problem in dict.fromkeys(filter(None, problems)):
         typer.echo(f"vrs: {problem}", err=True)
     if as_json:
@@ -255,9 +329,9 @@ def _once(name: str, given: Sequence[object]) -> None:
         raise InvalidValueError(name, ", ".join(map(str, given)), "named once each")
 
 
-def _worked(calls: Calls[Made], what: str, workers: int) -> list[Made]:
-    from interfaces.lab.runner import pooled
+def _worked(calls: Calls[Any], what: str, workers: Who, finished: FinishedRows) -> list[KeptRow]:
+    from interfaces.lab.runner import pooled_rows
 
     with bars(what) as bar:
-        task = bar.add_task(what, total=len(calls))
-        return pooled(calls, workers=workers, progress=lambda _: bar.advance(task))
+        task = bar.add_task(what, total=len(calls), completed=finished.ready(calls))
+        return pooled_rows(calls, workers=workers, finished=finished, progress=lambda _: bar.advance(task))

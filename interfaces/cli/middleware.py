@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from interfaces.cli.options import bars, option
+from interfaces.cli.options import On, bars, option
 from interfaces.system import written
 from vrs.errors import FormatError
 
@@ -33,13 +34,14 @@ def train(
     epsilon: Annotated[float, option("E", "Tolerance of the measure J.", min=1e-6, max=3)] = 0.25,
     neurons: Annotated[int, option("N", "Hidden ones.", min=1, max=1000)] = 20,
     epochs: Annotated[int, option("N", "Most steps of training.", min=1, max=100_000)] = 2000,
+    on: On = "",
     as_json: Annotated[bool, option("--json", "Write what was found on standard output.")] = False,
 ) -> None:
     """Train the network that says how fast a robot may go, and test it against the exact gain."""
     from interfaces.middleware import TrainingConfig
 
     _hold(out)
-    network = _trained(TrainingConfig(epsilon=epsilon, neurons=neurons, epochs=epochs), seed)
+    network = _trained(TrainingConfig(epsilon=epsilon, neurons=neurons, epochs=epochs), seed, on)
     with written(out, "can't hold the network"):
         out.write_text(network.to_json(), encoding="utf-8")
     found = _tested(network)
@@ -60,9 +62,15 @@ def _hold(out: Path) -> None:
         raise FormatError(str(out), "must be a file in a directory that exists")
 
 
-def _trained(config: TrainingConfig, seed: int) -> GainNetwork:
+def _trained(config: TrainingConfig, seed: int, on: str) -> GainNetwork:
     from interfaces.middleware import train
 
+    if on:
+        from interfaces.lab.executors import executor
+        from interfaces.lab.runner import pooled
+
+        with executor(on, lambda said: typer.echo(f"vrs: {said}", err=True)) as who:
+            return pooled([(partial(train, config, seed=seed), ())], workers=who)[0]
     with bars("training", "mean squared error {task.fields[error]:.1e}") as bar:
         task = bar.add_task("training", total=config.epochs, error=math.inf)
         return train(config, seed=seed, progress=lambda k, error: bar.update(task, completed=k, error=error))

@@ -16,17 +16,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
-from interfaces.system import is_loopback, on_signal
+from interfaces.system import is_loopback, on_signal, written
 from robots.robot import FOUND, USUAL, HeadCamera, described, load
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import asyncio
+    from concurrent.futures import Executor
     from contextlib import AsyncExitStack
     from ssl import SSLContext
 
     from rich.progress import Progress
 
+    from interfaces.lab.finished import FinishedRows
     from interfaces.link import LinkConditions
     from interfaces.messages.control import Attached, Role
     from interfaces.stream.access import Access
@@ -140,6 +142,17 @@ Host: TypeAlias = Annotated[
 Port: TypeAlias = Annotated[int, option("--port N", "0 for any that's free.", min=0, max=65535)]
 Seed: TypeAlias = Annotated[int, option("--seed N", "Seed of everything random.", min=0)]
 Workers: TypeAlias = Annotated[int, option("--workers N", "Processes at once; changes no figure.", min=1, max=64)]
+On: TypeAlias = Annotated[
+    str,
+    option(
+        "--on tcp://HOST:8786|MODULE:NAME",
+        "Who does the work instead of this machine: a Dask scheduler, or an executor of your own.",
+    ),
+]
+Resume: TypeAlias = Annotated[
+    bool,
+    option("--resume", "Go on with what an ended run of this command had finished, and keep that for the next."),
+]
 TokenFile: TypeAlias = Annotated[
     Path | None, option("--token-file FILE", "Tokens; needed off loopback. Made if it's missing.")
 ]
@@ -302,17 +315,63 @@ def left_out(ctx: typer.Context, why: str, options: Iterable[str]) -> None:
 
 
 def bars(before: str, after: str = "{task.completed}/{task.total}") -> Progress:
-    """Bars on standard error for what takes long, with the time so far: to be entered.
+    """Bars on standard error for what takes long, with the time left and the time so far: to be entered.
 
     Args:
         before: What stands before a bar, as a format of its `task`.
         after: What stands behind it.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    columns = TextColumn(before), BarColumn(), TextColumn(after), TimeElapsedColumn()
-    return Progress(*columns, console=Console(stderr=True), redirect_stdout=False)
+    texts = TextColumn(before), BarColumn(bar_width=20), TextColumn(after)
+    times = TimeRemainingColumn(), TextColumn("left,"), TimeElapsedColumn()
+    # What takes minutes each time says little of its pace within rich's usual half minute.
+    return Progress(*texts, *times, console=Console(stderr=True), redirect_stdout=False, speed_estimate_period=3600)
+
+
+@contextlib.contextmanager
+def sweeping(
+    ctx: typer.Context, out: Path, workers: int, on: str, *, resume: bool
+) -> Iterator[tuple[int | Executor, FinishedRows]]:
+    """Who makes a sweep's runs meanwhile, and where finished ones are kept: `Workers`, `On` and `Resume`.
+
+    Args:
+        ctx: Of the command.
+        out: Where the results go, an existing directory; once they are there, rows are kept for `--resume` alone.
+        workers: Processes at once.
+        on: Who does the work instead.
+        resume: Whether rows that are there count.
+
+    Raises:
+        InvalidValueError: If both ask for workers, or there's nobody there.
+        FormatError: If a module can't be imported, or the directory can't hold the results.
+        WorkersLostError: If they're lost meanwhile.
+        WorkerVersionError: If they have other versions than this program.
+    """
+    from interfaces.lab.executors import executor
+    from interfaces.lab.finished import FinishedRows
+
+    if on:
+        left_out(ctx, "--on says who does the work", ["workers"])
+    finished = FinishedRows(out / "finished", resume=resume)
+
+    def say(said: str) -> None:
+        typer.echo(f"vrs: {said}", err=True)
+
+    try:
+        with executor(on, say) if on else contextlib.nullcontext(workers) as who:
+            yield who, finished
+    except KeyboardInterrupt:
+        say(f"{len(finished.machines)} runs are finished; the same command with --resume goes on with them")
+        raise
+    if finished.problem:
+        say(finished.problem)
+    if on or resume:
+        with written(out, "can't hold the results"):
+            finished.write_machines(out / "machines.csv")
+    if not resume:
+        finished.clear()
 
 
 def tokens_for(host: str, token_file: Path | None) -> dict[Role, str] | None:

@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from interfaces.cli.demo import prepare
-from interfaces.cli.options import Workers, argument, bars, option
+from interfaces.cli.options import On, Resume, Workers, argument, bars, option, sweeping
 from vrs.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from interfaces.lab import Paper, Reproduction, Study
+    from interfaces.lab.claims import PaperPart
+    from interfaces.lab.finished import FinishedRows
+    from interfaces.lab.runner import Workers as Who
     from interfaces.report.claims import ClaimReport
 
 
 def reproduce(
+    ctx: typer.Context,
     paper: Annotated[
         str, argument("PAPER", "doulgeri, han2001, kim2002, kim2006, tipsuwan, or all for every paper.")
     ],
@@ -53,6 +57,8 @@ def reproduce(
         ),
     ] = "",
     workers: Workers = 2,
+    on: On = "",
+    resume: Resume = False,
     as_json: Annotated[
         bool, option("--json", "Write PAPER.json on standard output too, a document a paper.")
     ] = False,
@@ -71,7 +77,8 @@ def reproduce(
         (each, Study(seed, each.runs if runs is None else runs, each.length if length is None else length, body))
         for each in chosen
     ]
-    made = [(found, write(found, out)) for found in measured(studies, workers)]
+    with sweeping(ctx, out, workers, on, resume=resume) as (who, finished):
+        made = [(found, write(found, out)) for found in measured(studies, who, finished)]
     written: list[ClaimReport] = []
     for reproduction, path in made:
         written.extend(read_verdicts(path))
@@ -84,15 +91,22 @@ def reproduce(
         typer.echo(f"Wrote {page}: all claims on one page")
 
 
-def measured(chosen: Sequence[tuple[Paper, Study]], workers: int) -> Iterator[Reproduction]:
+def measured(chosen: Sequence[tuple[Paper, Study]], workers: Who, finished: FinishedRows) -> Iterator[Reproduction]:
     """Measure papers' claims, with a bar for each part; of several papers, one that is done has none any more."""
     from interfaces.lab import reproductions
+    from interfaces.lab.runner import calls_of
 
     with bars("{task.description:26}") as bar:
         tasks = {
-            part: bar.add_task(part.title, total=len(part.cases)) for paper, _ in chosen for part in paper.parts
+            part: bar.add_task(part.title, total=len(part.cases), completed=finished.ready(calls_of(part, asked)))
+            for paper, asked in chosen
+            for part in paper.parts
         }
-        for made in reproductions(chosen, workers=workers, progress=lambda part: bar.advance(tasks[part])):
+
+        def advance(part: PaperPart) -> None:
+            bar.advance(tasks[part])
+
+        for made in reproductions(chosen, workers=workers, finished=finished, progress=advance):
             yield made
             for part in made.paper.parts if len(chosen) > 1 else ():
                 bar.update(tasks[part], visible=False)

@@ -1,6 +1,7 @@
 """The laws on random edits of every kind, as many as VRS_SOAK_EDITS says; `make soak` makes a million of them.
 
-As a program it prints what was made and the worst figure of each law, or with BASE SHARD SESSION replays a session.
+As a program it prints what was made and the worst figure of each law, or with BASE SHARD SESSION replays a session;
+VRS_SOAK_ON has a Dask scheduler's workers, or another executor's, make the shards.
 """
 
 from __future__ import annotations
@@ -8,7 +9,8 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -124,16 +126,23 @@ def tables(total: Result, console: Console) -> None:
 
 def main() -> int:
     console, total = Console(), Result()
-    workers = os.cpu_count() or 1
+    if on := os.environ.get("VRS_SOAK_ON", ""):
+        # Workers elsewhere find what they're told by the module's name, which this process has as a program.
+        from interfaces.lab.executors import executor
+        from tests.vrs.test_soak import soak as work
+
+        who: AbstractContextManager[Executor] = executor(on, console.print)
+    else:
+        who, work = ProcessPoolExecutor(os.cpu_count() or 1), soak
     lines()  # what loads late is loaded once, before the workers are forked
     columns = (
         *Progress.get_default_columns()[:-1],
         TextColumn("{task.fields[broken]} laws broken"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console) as progress, ProcessPoolExecutor(workers) as pool:
+    with who as pool, Progress(*columns, console=console) as progress:
         task = progress.add_task("edits", total=EDITS, broken=0)
-        shards = [pool.submit(soak, k, min(SHARD, EDITS - k * SHARD)) for k in range(SHARDS)]
+        shards = [pool.submit(work, k, min(SHARD, EDITS - k * SHARD)) for k in range(SHARDS)]
         for done in as_completed(shards):
             result = done.result()
             total.add(result)
