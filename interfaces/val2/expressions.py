@@ -253,8 +253,6 @@ class Expressions:
         made: list[Closure] = []
         for i in range(max(len(given), len(slots)) if slots else 0):
             slot, operand = slots[min(i, len(slots) - 1)], given[i] if i < len(given) else None
-            if operand is None and slot.default is None and slot.required:
-                raise ValError("Missing argument", word, place=at)
             made.append(_constant(slot.default) if operand is None else self.of_kind(slot.kind, operand))  # type: ignore[arg-type]
         return made
 
@@ -263,8 +261,6 @@ class Expressions:
         row, given = row_of(e), e.arguments
         if row.act is None:
             return _placed(OF_NAMES[row.name](self, e), [lambda s: s], e.at)
-        if row.repeats and row.slots[-1].default is None:
-            given = tuple(a for a in given if a is not None)
         slots, act = row.slots, row.act
         if row.alike:
             texts = alike or "string" in map(kind_of, given)  # type: ignore[arg-type]

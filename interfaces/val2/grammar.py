@@ -333,7 +333,7 @@ class _Trees:
             operands[-1:-1] = [None] * (len(row.slots) - len(operands))
         if row.name == "ACCEL" and (len(operands) == 3 or operands[:1] == [None]):
             operands = operands[1:]
-        _count(row, operands)
+        row.expect(operands)
         made = [operand and _of_kind(row, row.slot(n).kind, operand) for n, operand in enumerate(operands)]
         called = "".join(one for one in made if isinstance(one, str))
         made = [one for one in made if not isinstance(one, str)]
@@ -556,21 +556,6 @@ def _applied(word: str, at: TextPosition, arguments: Sequence[Expression | Forma
 
 def _misplaced(word: str, at: TextPosition) -> ValError:
     return ValError("Syntax error", f"{word.upper()} can't stand here; parentheses may be missing", place=at)
-
-
-def _count(row: Form, operands: Sequence[Expression | Format | None]) -> None:
-    """Count an instruction's operands.
-
-    Raises:
-        ValError: If there are too few or too many of them.
-    """
-    if len(operands) > len(row.slots) and not row.repeats:
-        extra = operands[len(row.slots)]
-        place = None if extra is None or isinstance(extra, Format) else extra.at
-        raise ValError(TOO_MANY, f"allowed: {row.usage}", place=place)
-    for i in range(max(len(operands), len(row.slots))):
-        if row.slot(i).required and (i >= len(operands) or operands[i] is None):
-            raise ValError(MISSING, f"{row.slot(i).name}; allowed: {row.usage}")
 
 
 def _words(row: Form, tokens: Sequence[Node]) -> tuple[str, ...]:

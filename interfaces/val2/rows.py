@@ -119,17 +119,22 @@ class Form:
         """The slot of an operand, counted from 0: the last one is that of all behind it."""
         return self.slots[min(n, len(self.slots) - 1)]
 
-    def expect(self, arguments: Sequence[object | None], at: TextPosition) -> None:
-        """Count a function's arguments.
+    def expect(self, operands: Sequence[object | None], at: TextPosition | None = None) -> None:
+        """Count the operands of an instruction or a function.
+
+        Args:
+            operands: None where one was left out.
+            at: Where the error is, if that's not at one too many.
 
         Raises:
             ValError: If there are too few or too many of them.
         """
-        if len(arguments) > len(self.slots) and not self.repeats:
-            raise ValError(TOO_MANY, f"{self.name}: {self.usage}", place=at)
-        for i, slot in enumerate(self.slots):
-            if slot.required and (i >= len(arguments) or arguments[i] is None):
-                raise ValError(MISSING, f"{self.name}: {self.usage}", place=at)
+        if len(operands) > len(self.slots) and not self.repeats:
+            place = at or getattr(operands[len(self.slots)], "at", None)
+            raise ValError(TOO_MANY, f"allowed: {self.usage}", place=place)
+        for i in range(max(len(operands), len(self.slots))):
+            if self.slot(i).required and (i >= len(operands) or operands[i] is None):
+                raise ValError(MISSING, f"{self.slot(i).name}; allowed: {self.usage}", place=at)
 
 
 @dataclass(frozen=True, slots=True)
