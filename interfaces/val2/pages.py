@@ -79,13 +79,21 @@ class Complete(msgspec.Struct, frozen=True, tag="complete"):
     text: _Text
 
 
+class Columns(msgspec.Struct, frozen=True, tag="columns"):
+    """So many characters fit into a line of it."""
+
+    columns: Annotated[int, Meta(ge=1, le=10_000)]
+
+
 class ShownCharacters(msgspec.Struct, frozen=True, tag="shown"):
     """So many characters have been shown in all."""
 
     size: Annotated[int, Meta(ge=0, le=2**53)]
 
 
-_read: Final = msgspec.json.Decoder(PageHello | Who | TypedLines | Interrupt | Complete | ShownCharacters).decode
+_read: Final = msgspec.json.Decoder(
+    PageHello | Who | TypedLines | Interrupt | Complete | Columns | ShownCharacters
+).decode
 
 
 @dataclass(slots=True, eq=False)
@@ -151,6 +159,8 @@ class PageTerminal:
                 fragment, words = monitor.suggestions(text[:LONGEST])
                 listed = [one.word for one in words[:SUGGESTED]]
                 self._answers.append({"type": "completed", "text": text, "fragment": fragment, "words": listed})
+            case Columns(columns) if monitor is not None:
+                monitor.fit(columns)
             case Interrupt() if monitor is not None:
                 self._prompt = None
                 monitor.interrupt(now=now)

@@ -31,7 +31,7 @@ export function Panel({ station }) {
     const measured = history.at(cursor);
     scene.pose("virtual", chain.links(shown));
     scene.pose("real", measured && chain.links(measured));
-    scene.grasp(history.grasp(cursor), station.config.robot.hand);
+    scene.grasp(cursor, history.grasp(cursor), station.config.robot.hand);
   }
 
   useSignalEffect(() => {

@@ -107,6 +107,7 @@ class Monitor {
     this.term.options.fontSize = this.screen.clientWidth < WIDE ? SMALL : USUAL;
     this.fit.fit();
     this.editor.draw();
+    this.send({ type: "columns", columns: this.columns });
   }
 
   /** Whether a key is the terminal's. Escape leaves; keys that are the page's or the browser's stay so. */

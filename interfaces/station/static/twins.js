@@ -1,18 +1,23 @@
 // The scene with this page's colours, and with robots that the page may place by itself, to show another time.
 
+import { keep, placeAfter } from "./history.js";
 import { Pacing } from "./pacing.js";
 
 const ROOT = window.VrsScene.ROOT;
 
 export class StationScene extends window.VrsScene {
-  constructor(...given) {
-    super(...given);
+  /** @param {() => ?number} now session time [s]; null before it's known */
+  constructor(pane, labels, now) {
+    super(pane, labels);
     /** What the server says of the robots while another time is shown, to go on with; null while now is. */
     this.kept = null;
+    /** What it has said of the virtual hand and of what that has taken along: {t, command} by time, for each part. */
+    this.virtualHand = new Map();
     const handle = this.viewer.handle_command.bind(this.viewer);
     this.viewer.handle_command = (command) => {
+      if (isVirtualHand(command)) this.note(command, now() ?? -Infinity);
       const concerns = this.kept !== null && placed(command);
-      if (concerns) this.kept.set(command.path + " " + (command.property ?? ""), command);
+      if (concerns) this.kept.set(keyOf(command), command);
       else handle(command);
     };
     this.handle = handle;
@@ -55,10 +60,8 @@ export class StationScene extends window.VrsScene {
       object.updateMatrix();
       const name = "/" + path.join("/");
       this.kept.set(name + " ", { type: "set_transform", path: name, matrix: object.matrix.toArray() });
-      if (path[1] !== "predicted") continue;
-      this.kept.set(name + " visible", { type: "set_property", path: name, property: "visible", value: object.visible });
-      object.visible = false;
     }
+    for (const [key, rows] of this.virtualHand) this.kept.set(key, rows.at(-1).command);
     for (const part of ["real", "committed"]) {
       const path = `/${ROOT}/${part}`;
       const value = this.node(ROOT, part).visible;
@@ -77,7 +80,14 @@ export class StationScene extends window.VrsScene {
     this.viewer.set_dirty();
   }
 
-  /** Paths of the real hand's parts, of the things, and of what the virtual hand has taken along. */
+  /** Take what the server says at a time [s] of the virtual hand. */
+  note(command, t) {
+    const key = keyOf(command);
+    if (!this.virtualHand.has(key)) this.virtualHand.set(key, []);
+    keep(this.virtualHand.get(key), { t, command });
+  }
+
+  /** Paths of the real hand's parts, and of the things. */
   handled() {
     const below = (...path) => {
       let node = this.viewer.scene_tree;
@@ -85,15 +95,19 @@ export class StationScene extends window.VrsScene {
       return Object.keys(node?.children ?? {}).filter((name) => /^\d+$/.test(name)).map((name) => [...path, name]);
     };
     const links = below(ROOT, "real", "body");
-    return [...links.flatMap((path) => below(...path, "hand")), ...below(ROOT, "things"), ...below(ROOT, "predicted")];
+    return [...links.flatMap((path) => below(...path, "hand")), ...below(ROOT, "things")];
   }
 
   /**
-   * Show the real hand and the things as they were.
-   * @param {{opening: number, things: Map<number, number[]>} | null} was null leaves them
+   * Show both hands and the things as they were.
+   * @param {number} t [s]
+   * @param {{opening: number, things: Map<number, number[]>} | null} was of the real hand; null leaves it, and things
    * @param {{link: number, aside: number} | null} hand where the fingers are
    */
-  grasp(was, hand) {
+  grasp(t, was, hand) {
+    // Before the first of all it's as it was known first.
+    for (const rows of this.virtualHand.values()) this.handle(rows[Math.max(placeAfter(t, rows) - 1, 0)].command);
+    this.viewer.set_dirty();
     if (!was || !hand) return;
     for (const [finger, side] of [["1", 1], ["2", -1]]) {
       const node = this.viewer.scene_tree.find([ROOT, "real", "body", String(hand.link), "hand", finger]);
@@ -103,7 +117,6 @@ export class StationScene extends window.VrsScene {
       node.set_transform(matrix);
     }
     for (const [k, pose] of was.things) this.viewer.scene_tree.find([ROOT, "things", String(k)]).set_transform(matrixOf(pose));
-    this.viewer.set_dirty();
   }
 
   /** Show a robot with its links at poses; null hides it. */
@@ -124,13 +137,22 @@ function matrixOf([x, y, z, i, j, k, w]) {
   ];
 }
 
+const keyOf = ({ path, property }) => path + " " + (property ?? "");
+
+/** Whether a command moves a part of the virtual hand, or moves, shows or hides what that has taken along. */
+function isVirtualHand({ type, path }) {
+  const parts = path.split("/").filter(Boolean);
+  const part = (parts[1] === "virtual" && parts[4] === "hand" && parts.length === 6) || parts[1] === "predicted";
+  return parts[0] === ROOT && part && (type === "set_transform" || type === "set_property");
+}
+
 /** Whether a command places a robot, its hand or a thing, or shows or hides one or its path. */
 function placed({ type, path, property }) {
   const parts = path.split("/").filter(Boolean);
   if (parts[0] !== ROOT) return false;
   if (type === "set_transform") {
-    const real = parts[1] === "real" && parts[4] === "hand";
-    return (parts.length === 4 && parts[2] === "body") || real || parts[1] === "things" || parts[1] === "predicted";
+    const link = parts.length === 4 && parts[2] === "body";
+    return link || parts[4] === "hand" || parts[1] === "things" || parts[1] === "predicted";
   }
   return type === "set_property" && property === "visible" && (parts.length === 2 || parts[1] === "predicted");
 }

@@ -24,7 +24,7 @@ export function Viewport({ station, Scene, legend, standing }) {
   const [tries, setTries] = useState(1);
   useLayoutEffect(() => {
     try {
-      station.scene = new Scene(pane.current, labels.current);
+      station.scene = new Scene(pane.current, labels.current, () => station.session.now);
     } catch {
       pane.current.querySelector("canvas")?.remove();
       setFlat(true);

@@ -191,11 +191,10 @@ def explained(word: str) -> Iterator[Word]:
 def help_(state: TerminalState, rest: str) -> None:
     """HELP; HELP word."""
     if not rest:
-        state.say(
-            "Commands; they may be abbreviated. HELP and a word says more of it.", *layout.in_columns(COMMANDS)
-        )
-        state.say("Instructions, after DO or in programs:", *layout.in_columns(forms.INSTRUCTIONS))
-        state.say("Functions:", *layout.in_columns(forms.FUNCTIONS))
+        title = "Commands; they may be abbreviated. HELP and a word says more of it."
+        state.say(*textwrap.wrap(title, state.width), *layout.in_columns(COMMANDS, state.width))
+        state.say("Instructions, after DO or in programs:", *layout.in_columns(forms.INSTRUCTIONS, state.width))
+        state.say("Functions:", *layout.in_columns(forms.FUNCTIONS, state.width))
         return
     tables = (COMMANDS, forms.INSTRUCTIONS, forms.FUNCTIONS, forms.SWITCHES, forms.PARAMETERS)
     whole = next((some[0] for names in tables if len(some := begun(rest.upper(), names)) == 1), rest)
@@ -205,7 +204,7 @@ def help_(state: TerminalState, rest: str) -> None:
         raise ValError("Unknown word", _short(rest) + (near or "; HELP alone lists those that are allowed"))
     for one in found:
         kind = f"{one.kind}, {one.origin}" if one.origin else one.kind
-        said = textwrap.wrap(one.help, layout.WIDTH, initial_indent="    ", subsequent_indent="    ")
+        said = textwrap.wrap(one.help, state.width, initial_indent="    ", subsequent_indent="    ")
         state.say(f"{one.usage}  ({kind})", *said)
 
 

@@ -1,4 +1,4 @@
-"""How values, programs and tables are laid out on 80 columns."""
+"""How values, programs and tables are laid out on 80 columns, or fewer."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from interfaces.val2.motion.places import Where
 from interfaces.val2.values import VAL2, Dialect, Location, Transformation, Value
 
 WIDTH = 79
-"""Longest line [characters]."""
+"""Longest line, unless a terminal is narrower [characters]."""
 _COLUMN = 9
+_TABLE = 7 * _COLUMN
+"""Width of a location's six numbers and the hand [characters]; a narrower terminal shows three of them a line."""
+_HALF = 3 * _COLUMN
+_NAME = 15
 
 
 def fixed(value: float, decimals: int) -> str:
@@ -39,17 +43,25 @@ def row(location: Location, dialect: Dialect = VAL2) -> str:
     )
 
 
-def where(place: Where, dialect: Dialect = VAL2) -> list[str]:
+def folded(rows: Sequence[str], width: int) -> list[str]:
+    """Rows of a location's numbers; on a narrow terminal the first three of each, then the others."""
+    if width >= _TABLE:
+        return list(rows)
+    return [row[:_HALF] for row in rows] + [row[_HALF:] for row in rows]
+
+
+def where(place: Where, dialect: Dialect = VAL2, width: int = WIDTH) -> list[str]:
     """WHERE: the tool, then the joints and the hand."""
     joints = row(place.joints)
-    return [
+    rows = [
         f"{heading(dialect)}{'HAND':>{_COLUMN}}",
         row(place.tool, dialect),
         f"{joints}{fixed(place.hand, 2):>{_COLUMN}}",
     ]
+    return folded(rows, width)
 
 
-def values(known: Mapping[str, Value], dialect: Dialect = VAL2) -> list[str]:
+def values(known: Mapping[str, Value], dialect: Dialect = VAL2, terminal: int = WIDTH) -> list[str]:
     """LISTL, LISTR, LISTS: a line each; a location's long name has one of its own."""
     width, lines = max(map(len, known), default=0), []
     for name, value in known.items():
@@ -59,8 +71,11 @@ def values(known: Mapping[str, Value], dialect: Dialect = VAL2) -> list[str]:
             lines.append(f'{name:{width}} = "{visible(value)}"')
         else:
             shown = row(value, dialect)
-            lines += [] if lines else [f"{'':15}{heading(dialect)}"]
-            lines += [f"{name:15}{shown}"] if len(name) <= 15 else [name, f"{'':15}{shown}"]
+            if terminal < _NAME + _TABLE - _COLUMN:
+                lines += [name, *folded([heading(dialect), shown], terminal)]
+                continue
+            lines += [] if lines else [f"{'':{_NAME}}{heading(dialect)}"]
+            lines += [f"{name:{_NAME}}{shown}"] if len(name) <= _NAME else [name, f"{'':{_NAME}}{shown}"]
     return lines
 
 
@@ -78,13 +93,13 @@ def table(rows: Sequence[Sequence[str]], *, indent: str = "") -> list[str]:
     ]
 
 
-def in_columns(words: Iterable[str]) -> list[str]:
+def in_columns(words: Iterable[str], terminal: int = WIDTH) -> list[str]:
     """Words beside each other, in alphabetical order down the columns."""
     listed = sorted(words)
     if not listed:
         return []
     width = max(map(len, listed)) + 2
-    many = max((WIDTH + 2) // width, 1)
+    many = max((terminal + 2) // width, 1)
     deep = -(-len(listed) // many)
     return ["".join(f"{word:{width}}" for word in listed[line::deep]).rstrip() for line in range(deep)]
 

@@ -29,7 +29,7 @@ REPEAT_PERIOD: Final = 0.5
 def _change(state: TerminalState, variable: Variable, value: Location) -> Dialogue:
     """Show a location's six numbers and ask for changes to them, such as `,,10`, until there are none."""
     dialect = state.controller.dialect
-    state.say(layout.heading(dialect), layout.row(value, dialect))
+    state.say(*layout.folded([layout.heading(dialect), layout.row(value, dialect)], state.width))
     while True:
         try:
             text = (yield Question("Change? ")) or ""
@@ -40,7 +40,7 @@ def _change(state: TerminalState, variable: Variable, value: Location) -> Dialog
                 state.controller.memory.set(variable, value)
                 return
             value = _changed(value, text, dialect)
-            state.say(layout.row(value, dialect))
+            state.say(*layout.folded([layout.row(value, dialect)], state.width))
 
 
 def _changed(value: Location, text: str, dialect: Dialect) -> Location:
@@ -75,23 +75,22 @@ def where(state: TerminalState, rest: str) -> Dialogue:
         real = arm.real(now=state.now)
         if real is None:
             raise ValError("No other twin", "nothing has been heard of a real arm")
-        state.say(*layout.where(real, state.controller.dialect))
+        state.say(*layout.where(real, state.controller.dialect, state.width))
     else:
         nothing(rest, "WHERE but 1 or REAL")
-        state.say(*layout.where(arm.here(now=state.now), state.controller.dialect))
+        state.say(*layout.where(arm.here(now=state.now), state.controller.dialect, state.width))
 
 
 def _watch(state: TerminalState) -> Dialogue:
     arm, due = state.controller.arm, state.now
-    heading, *_ = layout.where(arm.here(now=due), state.controller.dialect)
     shown: list[str] = []
-    state.say(heading)
     while (yield Question(due=due)) is None:
         due = state.now + REPEAT_PERIOD
-        _, *rows = layout.where(arm.here(now=state.now), state.controller.dialect)
+        rows = layout.where(arm.here(now=state.now), state.controller.dialect, state.width)
         if rows != shown:
+            # One heading does, unless the rows are folded.
+            state.say(*rows[1 if shown and len(rows) == 3 else 0 :])
             shown = rows
-            state.say(*rows)
 
 
 def rewind(state: TerminalState, rest: str) -> None:
@@ -102,7 +101,7 @@ def rewind(state: TerminalState, rest: str) -> None:
     apart = (
         f"{layout.fixed(now - t, 3)} s ago" if t <= now else f"{layout.fixed(t - now, 3)} s from now, as planned"
     )
-    state.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past, state.controller.dialect))
+    state.say(f"At {layout.fixed(t, 3)} s, {apart}", *layout.where(past, state.controller.dialect, state.width))
 
 
 def here(state: TerminalState, rest: str) -> Dialogue:
@@ -158,7 +157,7 @@ def teach(state: TerminalState, rest: str) -> Dialogue:
         with state.guarded():
             value = state.here(variable)
             state.controller.memory.set(variable, value)
-            state.say(layout.row(value, state.controller.dialect))
+            state.say(*layout.folded([layout.row(value, state.controller.dialect)], state.width))
             variable = following(variable)
 
 
@@ -178,6 +177,6 @@ def frame(state: TerminalState, rest: str, *, word: str) -> None:
     arm = state.controller.arm
     if rest in {"", "?"}:
         shown, dialect = arm.tool() if word == "TOOL" else arm.base(), state.controller.dialect
-        state.say(layout.heading(dialect), layout.row(shown, dialect))
+        state.say(*layout.folded([layout.heading(dialect), layout.row(shown, dialect)], state.width))
     else:
         state.controller.do(state.instruction(word, rest), now=state.now)

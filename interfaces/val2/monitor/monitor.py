@@ -12,6 +12,7 @@ from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import commands, running
 from interfaces.val2.monitor.control import ControlState, SharedController
 from interfaces.val2.monitor.files import Files
+from interfaces.val2.monitor.layout import WIDTH
 from interfaces.val2.monitor.state import Dialogue, Expects, OutputText, Question, Style, TerminalState, split_word
 from interfaces.val2.printer import print_step
 
@@ -25,6 +26,8 @@ CONTROL_POLL: Final = 0.02
 """Time between two looks whether control was given [s]."""
 _URGENT: Final = frozenset({"ABORT", "PANIC"})
 """What doesn't wait."""
+_NARROWEST: Final = 40
+"""Columns for which tables are laid out at least."""
 _GREETING: Final = "", ""
 """What waits for control at the beginning."""
 
@@ -119,6 +122,10 @@ class TerminalMonitor:
         """What was said since this was last called."""
         output, self.state.output = self.state.output, []
         return output
+
+    def fit(self, columns: int) -> None:
+        """Lay tables out for a terminal of so many columns; one wider than usual changes nothing."""
+        self.state.width = min(max(columns - 1, _NARROWEST), WIDTH)
 
     def start(self, *, now: float) -> None:
         """Say what this is, and ask for control."""

@@ -6,6 +6,7 @@ import contextlib
 import enum
 import math
 import re
+import textwrap
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Final, TypeAlias
@@ -14,6 +15,7 @@ from interfaces.val2.controller import Controller
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor.control import Control
 from interfaces.val2.monitor.files import Files
+from interfaces.val2.monitor.layout import WIDTH
 from interfaces.val2.parser import parse_expression, parse_line
 from interfaces.val2.printer import print_expression
 from interfaces.val2.syntax import Expression, Number, Step, Variable
@@ -184,6 +186,8 @@ class TerminalState:
     """Name and version of the program, and what it's connected to."""
     now: float = 0.0
     """Session time at which the terminal does what is due [s]."""
+    width: int = WIDTH
+    """Longest line that it shows [characters]."""
     line: str = ""
     """The line that is being carried out."""
     output: list[OutputText] = field(default_factory=list)
@@ -199,8 +203,11 @@ class TerminalState:
     """Steps that NEXT has still to do."""
 
     def say(self, *lines: str, style: Style = Style.ANSWER) -> None:
-        """Say whole lines."""
-        self.output.extend(OutputText(f"{line}\n", style) for line in lines)
+        """Say whole lines; notes and errors by lines that a narrow terminal shows."""
+        for line in lines:
+            folds = self.width < WIDTH and style is not Style.ANSWER
+            shown = textwrap.fill(line, self.width, break_long_words=False) if folds else line
+            self.output.append(OutputText(f"{shown}\n", style))
 
     def say_all(self, lines: Iterable[str], none: str = "") -> None:
         """Say whole lines, or a note where there are none."""

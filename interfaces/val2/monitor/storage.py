@@ -50,7 +50,9 @@ def list_values(state: TerminalState, rest: str, *, kind: str) -> None:
             raise ValError("Invalid argument", f"{rest}: a string is wanted")
         state.say(f'"{layout.visible(value)}"')
     else:
-        state.say_all(layout.values(chosen(known, rest, _WORDS[kind]), state.controller.dialect), f"No {kind}")
+        state.say_all(
+            layout.values(chosen(known, rest, _WORDS[kind]), state.controller.dialect, state.width), f"No {kind}"
+        )
 
 
 def _product(rest: str, known: Iterable[str]) -> bool:
@@ -133,7 +135,7 @@ _VALUE_WORK: Final = 4
 def flist(state: TerminalState, rest: str) -> None:
     """FLIST, LISTF: the files."""
     nothing(rest, "FLIST")
-    state.say_all(layout.in_columns(state.files.listed()), "No files")
+    state.say_all(layout.in_columns(state.files.listed(), state.width), "No files")
 
 
 def load(state: TerminalState, rest: str) -> None:

@@ -177,6 +177,7 @@ class Terminal:
 
     async def _next(self) -> None:
         """Take a line."""
+        self._monitor.fit(self._session.output.get_size().columns)
         try:
             text = await self._session.prompt_async()
         except EOFError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,34 @@ def test_the_hand_is_opened_and_closed(page: Page) -> None:
     page.wait("station.idle !== ''")
     page.page.click("#hand-close", force=True)
     told(page, "control", "#hand-close")
+
+
+def test_the_virtual_hand_is_looked_back_at(page: Page) -> None:
+    aside = """() => { const path = ["vrs", "virtual", "body", "6", "hand", "1"];
+        const { object } = station.scene.viewer.scene_tree.find(path);
+        object.updateMatrix();
+        return object.matrix.elements[12]; }"""
+
+    def is_at(place: float) -> bool:
+        return bool(abs(page.get(aside) - place) < 1e-4)
+
+    page.page.click("#hand-open")
+    page.page.wait_for_timeout(1000)
+    opened, t = page.get(aside), page.get("station.session.now")
+    page.page.click("#hand-close")
+    page.page.wait_for_timeout(1000)
+    closed, later = page.get(aside), page.get("station.session.now")
+    assert closed < opened - 0.01
+    for then, place in ((t, opened), (later, closed), (t, opened)):
+        page.page.evaluate("t => (station.cursor = t)", then)
+        page.until(partial(is_at, place))
+    # What is told meanwhile is shown when the page is live again.
+    page.page.click("#hand-open")
+    page.page.evaluate("t => (station.cursor = t)", later)
+    page.page.wait_for_timeout(1000)
+    assert is_at(closed)
+    page.page.evaluate("station.cursor = null")
+    page.until(lambda: is_at(opened))
 
 
 def test_angles_are_wheres_at_every_turn(page: Page) -> None:

@@ -120,3 +120,20 @@ def test_who_only_looks_is_told_so(tmp_path):
     assert "looking only" in seen.text
     assert "*No control*" in seen.type("do ready")
     assert "919.85" in seen.type("where")
+
+
+def test_what_is_said_fits_a_narrow_page(tmp_path):
+    seen = Seen(tmp_path)
+    wide = seen.type("WHERE")
+    lines = ("POINT a", "1,2,3,4,5,6", "", "WHERE", "HELP", "HELP MOVE", "LISTL", "TOOL", "STATUS", "SPEDE 20")
+
+    def longest():
+        return max(map(len, "".join(seen.type(line) for line in lines).splitlines()))
+
+    assert longest() > 60
+    seen.tell(type="columns", columns=50)
+    narrow = seen.type("WHERE")
+    assert sorted(narrow.split()) == sorted(wide.split())
+    assert longest() < 50
+    seen.tell(type="columns", columns=200)
+    assert seen.type("WHERE") == wide
