@@ -21,7 +21,11 @@ class Station extends EventTarget {
     this.drives = config.robot.segments === "arcs";
     /** Links and tool at joints; a robot that drives has none. */
     this.chain = this.drives ? null : new Chain(config.robot);
-    this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
+    this.session = new (this.drives ? DriveSession : Session)({
+      name: myName(),
+      token: sessionStorage.getItem("token"),
+      relays: config.relays,
+    });
     this.layout = new Layout(config.panels);
     observed(this, {
       // What is said to those who listen to the page.

@@ -82,13 +82,17 @@ class Newest:
         """Values newer than a version, the oldest first; readers at the same version share the answer."""
         found = self._later.get(version)
         if found is None:
-            newer = []
-            for of, data in reversed(self.values.values()):
-                if of <= version:
-                    break
-                newer.append(data)
-            found = self._later[version] = tuple(reversed(newer))
+            found = self._later[version] = tuple(data for _, data in self.entries(version))
         return found
+
+    def entries(self, version: int) -> list[tuple[str, bytes]]:
+        """The same with their keys."""
+        newer = []
+        for key, (of, data) in reversed(self.values.items()):
+            if of <= version:
+                break
+            newer.append((key, data))
+        return newer[::-1]
 
     def version_of(self, count: int, version: int) -> int:
         """Version of the last of the first `count` values newer than a version."""
