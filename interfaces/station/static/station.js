@@ -63,6 +63,7 @@ class Station extends EventTarget {
     const { link, holds, lease, mayCommand } = this.session;
     if (link !== "live") return "No connection.";
     if (holds) return "";
+    if (this.session.relays) return "This relay is for watching: control is to be had at the robot's own page.";
     if (!mayCommand) return "You are here to watch.";
     return lease.state === "held" ? `${lease.holder} has control.` : "Take control first, in the bar above.";
   }
