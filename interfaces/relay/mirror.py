@@ -220,7 +220,9 @@ class Mirror:
         except ProtocolError:
             self.bad += 1
             return
-        self.heard = max(self.heard, at)
+        # A hub that hangs tells the time still; of a mobile robot at rest nothing else comes.
+        if kind != "clock" or isinstance(self.welcome, MobileWelcome):
+            self.heard = max(self.heard, at)
 
     def _take(self, kind: str, data: bytes, at: float) -> None:
         if kind == "clock":

@@ -61,8 +61,8 @@ class Line:
         """Connect, and wait until the server has said welcome.
 
         Args:
-            urls: Of WebSockets of servers of the same robot, from `server_url`: when a connection doesn't come about
-                or ends, the next one is tried.
+            urls: Of WebSockets of servers of the same robot, from `server_url`: when a connection doesn't come
+                about or ends, the next one is tried.
             core: The client.
             clock: Local time.
             loop: Where it runs, in a thread of its own.
