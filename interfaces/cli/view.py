@@ -93,7 +93,7 @@ async def _view(
 
     from interfaces.link.proxy import Address
     from interfaces.relay.network import Network
-    from interfaces.relay.relay import Relay, RelayConfig
+    from interfaces.relay.relay import SOCKETS, Relay, RelayConfig
     from interfaces.stream import sockets
     from interfaces.stream.server import application
     from vrs.clock import WallClock
@@ -115,7 +115,7 @@ async def _view(
             say=lambda said: typer.echo(f"vrs: {said}", err=True),
         )
         app = application([Mount("/", relay)], allowed(at.port), audit=log)
-        await stack.enter_async_context(sockets.serve(app, listening, tls=tls_of(certificate)))
+        await stack.enter_async_context(sockets.serve(app, listening, limits=SOCKETS, tls=tls_of(certificate)))
         await stack.enter_async_context(relay.running())
         keep_quiet()
         tidying = asyncio.create_task(collect_at_leisure(lambda: True))

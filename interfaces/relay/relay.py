@@ -27,9 +27,11 @@ from interfaces.stream.audit import AuditLog
 from interfaces.stream.codec import Encoding, encode
 from interfaces.stream.hub import RESTART, TRY_AGAIN, Hub, HubConfig
 from interfaces.stream.leasing import LeasedRobot
+from interfaces.stream.limits import ClientLimits
 from interfaces.stream.meshcat.newest import Nodes
 from interfaces.stream.meshcat.page import routes as view_routes
 from interfaces.stream.server import HEADERS, Endpoint, HubServer, admit, health, may_see
+from interfaces.stream.sockets import SocketLimits
 from robots.onboard.lease import Ended, Grant
 from robots.onboard.lease import Lease as RobotLease
 from vrs.clock import WallClock
@@ -40,6 +42,12 @@ AGAIN: Final = 2.0
 """Time after which a hub that can't be relayed is tried again [s]."""
 SILENCE: Final = 5.0
 """A hub that isn't heard for so long is gone [s]."""
+MOST_VIEWERS: Final = 4096
+"""Viewers of a relay."""
+LIMITS: Final = ClientLimits(clients=MOST_VIEWERS)
+"""Of its viewers."""
+SOCKETS: Final = SocketLimits(strangers=MOST_VIEWERS, backlog=MOST_VIEWERS // 4)
+"""Of its connections: when another relay ends, all of its viewers come at once."""
 UNHEARD: Final = "the robot's server isn't heard"
 _WAITING: Final = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta http-equiv="refresh" content="2">'
@@ -101,7 +109,7 @@ class Relay:
         self.config, self._network, self._access, self._clock = config, network, access, clock
         self._audit, self._say = audit, say
         self._who = secrets.token_hex(8)
-        self._nodes = Nodes()
+        self._nodes = Nodes(MOST_VIEWERS)
         self._view = view_routes(self._nodes, authorize=partial(admit, access, Role.VIEWER))
         self._waiting = Router([
             Route("/health", self._say_unheard), WebSocketRoute("/ws", Endpoint(self._refuse)), station_files(),
@@ -264,7 +272,7 @@ class Relay:
         welcome = mirror.welcome
         config = HubConfig(
             rates=getattr(welcome, "rates", ()), server=self.config.server, instance=welcome.instance,
-            relays=mirror.facts.address,
+            relays=mirror.facts.address, limits=LIMITS,
         )  # fmt: skip
         hub = Hub(mirror.site, RobotLease(), self._access, _NoRobot(), config=config, audit=self._audit)
         self._pass_on(mirror, hub)

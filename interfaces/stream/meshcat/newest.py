@@ -25,13 +25,14 @@ class Newest:
     Putting never waits. A reader costs a number: the version that it has read up to.
     """
 
-    def __init__(self, greeting: bytes) -> None:
+    def __init__(self, greeting: bytes, most: int = MOST_READERS) -> None:
         """Start without values.
 
         Args:
             greeting: What each reader gets before anything else.
+            most: Most readers.
         """
-        self.greeting = greeting
+        self.greeting, self._most = greeting, most
         self.version = 0
         """Counts up with each change of any value."""
         self.values: dict[str, tuple[int, bytes]] = {}
@@ -68,8 +69,8 @@ class Newest:
         Raises:
             InvalidValueError: If there are too many.
         """
-        if len(self._slots) >= MOST_READERS:
-            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_READERS} a scene")
+        if len(self._slots) >= self._most:
+            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {self._most} a scene")
         slot = ReaderPosition(self, changed)
         self._slots.add(slot)
         return slot
@@ -152,9 +153,13 @@ _encoder = msgspec.msgpack.Encoder(enc_hook=_ext)
 class Nodes(Newest):
     """A scene's nodes by MeshCat's commands: everything once, then what changes."""
 
-    def __init__(self) -> None:
-        """Begin with nothing to be seen."""
-        super().__init__(_encoder.encode({"type": "delete", "path": ROOT}))
+    def __init__(self, most: int = MOST_READERS) -> None:
+        """Begin with nothing to be seen.
+
+        Args:
+            most: Most readers.
+        """
+        super().__init__(_encoder.encode({"type": "delete", "path": ROOT}), most)
         self._others: list[tuple[Nodes, str]] = []
         """Scenes in which this one's robots are seen, too, and the node there below which they are."""
 
