@@ -1,4 +1,4 @@
-"""Relays: do all edits reach 1,000 viewers in time, what does the hub pay for a second one, and what if one is killed?
+"""Do all edits reach 1,000 viewers of relays in time, what does the hub pay for a second one, and what if one is killed?
 
 Router, hub with its robot, relays and viewers (`watchers.py`) are processes of their own, all on loopback, all of
 this machine's cores. An edit's age counts from when its command is sent to the hub. `python -m benchmarks relays`.
