@@ -192,7 +192,7 @@ class Mirror:
         self._source = SegmentSource(self._port, resend=RESEND, applied=self._applied)
         self._port.join(self._source)
         self._journal: MirroredJournal | None = None
-        self._scene, self._scene_lacks, self._has_news = 0, True, False
+        self._scene, self._scene_lacks, self._has_news = 0, False, False
         self._due = -math.inf
 
     @property
@@ -252,6 +252,10 @@ class Mirror:
     def _applied(self, timeline: Timeline, number: int, change: Change | None) -> None:
         if self._journal is not None:
             self._journal.adopt(timeline, number, change)
+
+    def look(self) -> None:
+        """Somebody looks at the scene from now on: it's to be fetched as a whole."""
+        self._scene_lacks, self._due = True, -math.inf
 
     def advance(self) -> tuple[Asked, ...]:
         """What is to be asked for now."""

@@ -95,8 +95,8 @@ class Publisher(OperatorDevice):
         network.answer(f"{key}/clock", instance, self._tell_time, at_once=True)
         network.answer(f"{key}/facts", instance, lambda *_: (self._facts(),))
         network.answer(f"{key}/news", instance, lambda *_: map(self._encoded, self._all_news()))
-        network.answer(f"{key}/scene", instance, lambda *_: (self._scene_since(0),))
-        self._watched = network.is_heard(f"{key}/scene")
+        network.answer(f"{key}/view/scene", instance, lambda *_: (self._scene_since(0),))
+        self._watched = network.is_heard(f"{key}/view/scene")
         network.announce(f"{key}/hub/{instance}")
         self._turning.start()
 
@@ -180,7 +180,7 @@ class Publisher(OperatorDevice):
     def _draw(self) -> None:
         """Publish what has changed in the scene."""
         if self._place is not None and self._scene.version > self._shown:
-            self._put("scene", self._scene_since(self._shown), bulk=True)
+            self._put("view/scene", self._scene_since(self._shown), bulk=True)
             self._shown = self._scene.version
 
     def _scene_since(self, version: int) -> bytes:

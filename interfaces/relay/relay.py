@@ -44,8 +44,8 @@ SILENCE: Final = 5.0
 """A hub that isn't heard for so long is gone [s]."""
 MOST_VIEWERS: Final = 4096
 """Viewers of a relay."""
-LIMITS: Final = ClientLimits(clients=MOST_VIEWERS)
-"""Of its viewers."""
+LIMITS: Final = ClientLimits(clients=MOST_VIEWERS, address=200.0, others=200.0)
+"""Of its viewers: nobody commands here who'd be held up by all of them together."""
 SOCKETS: Final = SocketLimits(strangers=MOST_VIEWERS, backlog=MOST_VIEWERS // 4)
 """Of its connections: when another relay ends, all of its viewers come at once."""
 UNHEARD: Final = "the robot's server isn't heard"
@@ -237,7 +237,9 @@ class Relay:
             if self.mirror is not mirror:
                 return
             for kind, payload in mirror.advance():
-                network.ask(f"{key}/{kind}", payload, instance, self._who, take)
+                network.ask(
+                    f"{key}/{'view/scene' if kind == 'scene' else kind}", payload, instance, self._who, take
+                )
             if self._hub is not None and server is not None:
                 self._pass_on(mirror, self._hub)
                 server.kick()
@@ -245,7 +247,16 @@ class Relay:
         async with contextlib.AsyncExitStack() as stack:
             stack.callback(self._forget)
             stack.callback(network.hear(f"{key}/*", instance, take))
+            looking = stack.enter_context(contextlib.ExitStack())
+            looked = False
             while self._clock.now() < mirror.heard + SILENCE:
+                # Only what somebody looks at is drawn, and sent.
+                if looked is (self._nodes.readers == 0):
+                    looked = not looked
+                    looking.close()
+                    if looked:
+                        looking.callback(network.hear(f"{key}/view/scene", instance, take))
+                        mirror.look()
                 turn()
                 if server is None and mirror.site is not None:
                     hub = self._hub = self._made(mirror)

@@ -158,6 +158,9 @@ def test_a_silent_hub_is_stale_and_the_scene_comes_whole(network):
     with published(at) as hub:
         hub.call(hub.scene.put_property, "/vrs/virtual", "visible", True)
         with relayed(at) as relay:
+            assert not relay.relay._nodes.values
+            assert not hub.publisher.health()["scene"]
+            place = relay.call(relay.relay._nodes.join)
             until(lambda: len(relay.relay._nodes.values) == 1)
             until(lambda: hub.publisher.health()["scene"])
             for k in range(5):
@@ -167,6 +170,8 @@ def test_a_silent_hub_is_stale_and_the_scene_comes_whole(network):
             assert {key: data for key, (_, data) in relay.relay._nodes.values.items()} == {
                 key: data for key, (_, data) in hub.scene.values.items()
             }
+            relay.call(relay.relay._nodes.leave, place)
+            until(lambda: not hub.publisher.health()["scene"])
             mirror, servlet = relay.relay.mirror, relay.call(relay.relay._hub.site.servlet)
             relay.call(servlet.receive, Follow(1, ViewForm.SEGMENTS), now=relay.call(mirror.clock.now))
 
@@ -233,10 +238,12 @@ def test_t21_what_is_malformed_or_of_another_hub_changes_no_relay(network):
     with published(at) as hub, relayed(at) as relay, connect(relay.url, role="viewer") as one:
         viewer = one.viewer()
         until(lambda: viewer.timeline is not None)
+        relay.call(relay.relay._nodes.join)
+        until(lambda: hub.publisher.health()["scene"])
         mirror = relay.relay.mirror
         forged = msgspec.msgpack.encode({"type": "pulse", "edit": 9, "now": 1.0, "past": LARGEST})
         router.call(router.network.put, f"{KEY}/timeline", forged, "two")
-        for kind in ("timeline", "scene", "state", "clock", "lease", "whatever"):
+        for kind in ("timeline", "view/scene", "state", "clock", "lease", "whatever"):
             for body in (
                 b"",
                 b"\xc1",
