@@ -18,6 +18,8 @@ import msgspec
 
 HELLO: dict[str, Any] = {"type": "hello", "protocol": 1, "role": "viewer", "name": "watcher"}
 FOLLOW: dict[str, Any] = {"type": "follow", "number": 1, "form": "segments"}
+BINARY, PING, PONG = 0x2, 0x9, 0xA
+"""Opcodes of WebSocket."""
 AGAIN = 0.05
 """Time before the next attempt to connect [s]."""
 
@@ -96,8 +98,11 @@ class Watcher(asyncio.Protocol):
                 size, body = int.from_bytes(held[place + 2 : place + 10], "big"), place + 10
             if len(held) < body + size:
                 break
-            if held[place] & 0x0F == 2:
+            opcode = held[place] & 0x0F
+            if opcode == BINARY:
                 self._take(held, body, size, now)
+            elif opcode == PING:
+                self.transport.write(bytes([0x80 | PONG, 0x80 | size]) + bytes(4) + held[body : body + size])
             place = body + size
         del held[:place]
 
