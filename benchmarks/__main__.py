@@ -18,7 +18,7 @@ PARTS = (
 """Benchmarks that give results."""
 DETAILS = (
     "timeline", "planning", "lines", "steering", "viewers", "alike", "steady", "station", "camera", "recordings",
-    "entered", "altering", "classroom", "inverse", "datagrams", "fleet", "cluster",
+    "entered", "altering", "classroom", "inverse", "datagrams", "fleet", "cluster", "relays",
 )  # fmt: skip
 """Benchmarks that print more about one thing."""
 

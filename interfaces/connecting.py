@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def connect(
-    url: str,
+    url: str | Sequence[str],
     *,
     role: str = "operator",
     token: str | None = None,
@@ -24,7 +25,8 @@ def connect(
     Args:
         url: `HOST:PORT`, or an address by http, https, ws or wss; off this machine by TLS only. Behind it stands
             what the server's certificate is known by: `#sha256=` and the fingerprint that the server has printed,
-            or `#ca=FILE`, authorities of one's own, PEM; else the system's authorities count.
+            or `#ca=FILE`, authorities of one's own, PEM; else the system's authorities count. Of several, as
+            of relays, each is tried when the one before it doesn't answer.
         role: What to do: `viewer`, `operator` or `admin`.
         token: What the role needs; none on a loopback address, but for an admin.
         name: For people, 1 to 100 characters.
@@ -49,7 +51,7 @@ def connect(
 
 
 def connect_mobile(
-    url: str,
+    url: str | Sequence[str],
     *,
     role: str = "operator",
     token: str | None = None,

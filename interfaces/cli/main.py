@@ -31,6 +31,7 @@ from interfaces.cli.rsp import rsp
 from interfaces.cli.run import run
 from interfaces.cli.serve import serve
 from interfaces.cli.token import token
+from interfaces.cli.view import router, view
 from interfaces.system import software
 from vrs.errors import VrsError
 
@@ -57,6 +58,8 @@ app.command(short_help="A recording as tables or as a report")(export)
 app.command(short_help="Seeded experiments with a mobile robot")(lab)
 app.command(short_help="What papers claim, measured")(reproduce)
 app.command(short_help="An emulated internet between two programs")(link)
+app.command(short_help="A relay: a served robot's page for viewers elsewhere")(view)
+app.command(short_help="What joins relays to servers, by Zenoh")(router)
 app.add_typer(token, short_help="Tokens of people: make, list, end")
 app.add_typer(rsp, short_help="Robot models of the simulacrum protocol, and code from them")
 app.add_typer(middleware, short_help="The gain network of the network middleware")

@@ -188,6 +188,12 @@ ReachedAs: TypeAlias = Annotated[
     ),
 ]
 """What else requests may ask for: see `asked_for`."""
+ZenohFile: TypeAlias = Annotated[
+    Path | None,
+    option(
+        "--zenoh-config FILE", "More of Zenoh's own configuration, JSON5: certificates of tls/ endpoints, users."
+    ),
+]
 Hosts: TypeAlias = Callable[[int], frozenset[str]]
 """What the Host of a request may be, by the port that a server listens on."""
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(:[0-9]{1,5})?", re.IGNORECASE)

@@ -35,6 +35,7 @@ from interfaces.cli.options import (
     TlsCert,
     TlsKey,
     TokenFile,
+    ZenohFile,
     abandon,
     access_for,
     asked_for,
@@ -72,6 +73,8 @@ if TYPE_CHECKING:
     from interfaces.link import LinkConditions
     from interfaces.link.proxy import Address
     from interfaces.recording.live import LiveRecording
+    from interfaces.relay.network import NetworkConfig
+    from interfaces.relay.publisher import Publisher
     from interfaces.runtime.live.operator import LiveOperator
     from interfaces.station.page import Station
     from interfaces.stream.access import Access
@@ -176,6 +179,11 @@ def serve(
     recordings: Annotated[Path, option("DIR", "Where the station records to; made when it's needed.")] = Path(
         "recordings"
     ),
+    zenoh: Annotated[
+        str, option("ENDPOINT", "Publish to relays, vrs view, by a router that's there: tcp/127.0.0.1:7447.")
+    ] = "",
+    site: Annotated[str, option("NAME", "What relays call this server; unless given, this machine's name.")] = "",
+    zenoh_config: ZenohFile = None,
     until_eof: Annotated[bool, option("--until-eof", "End when standard input does.")] = False,
 ) -> None:
     """Serve the virtual robot to browsers and programs, and let a real one follow it, until Ctrl-C or SIGTERM."""
@@ -262,6 +270,9 @@ def serve(
         if path is not None:
             # Before a robot is started.
             Sink.create(path).close()
+    if not zenoh:
+        left_out(ctx, "nothing is published without --zenoh", ("site", "zenoh-config"))
+    published = _published(zenoh, site, zenoh_config, reached_as)
     if advice:
         typer.echo(f"vrs: {advice}", err=True)
     given = {
@@ -306,7 +317,32 @@ def serve(
     taught = _Class(reached_as[0] if reached_as else "", teacher) if class_ else None
     with audit_log(audit) as log, shared or contextlib.nullcontext():
         access.audit = log
-        run_loop(_serve(serving, access, host, port, allowed, taught, certificate, log, fleet, until_eof=until_eof))
+        doors = access, host, port, allowed, taught, certificate, log
+        run_loop(_serve(serving, *doors, fleet, published, until_eof=until_eof))
+
+
+@dataclass(frozen=True, slots=True)
+class _Published:
+    """How a server is published to relays."""
+
+    network: NetworkConfig
+    site: str
+    """Name of the server."""
+    reached_as: str
+    """By what others reach it, where that's not by its own address; empty where it is."""
+
+
+def _published(zenoh: str, site: str, file: Path | None, reached_as: Sequence[str] | None) -> _Published | None:
+    """How `--zenoh` asks for it; None where it doesn't."""
+    import socket
+
+    if not zenoh:
+        return None
+    from interfaces.relay.network import NetworkConfig
+
+    return _Published(
+        NetworkConfig((zenoh,), file=file), site or socket.gethostname(), reached_as[0] if reached_as else ""
+    )
 
 
 def _site_url(text: str) -> str:
@@ -425,6 +461,7 @@ async def _serve(
     certificate: Certificate | None,
     log: AuditLog | None,
     fleet: Fleet | None,
+    published: _Published | None,
     *,
     until_eof: bool,
 ) -> None:
@@ -488,6 +525,11 @@ async def _serve(
             parts.append(overview.running())
         if len(serving) > 1:
             await asyncio.to_thread(share_world, operators, starts, None if overview is None else overview.scene)
+        page, ws, known = schemes(certificate)
+        if published is not None:
+            base = f"{page}://{published.reached_as or shown}"
+            for one, operator in zip(serving, operators, strict=True):
+                operator.devices = *operator.devices, _publisher(published, one, operator, f"{base}{one.folder}/")
         first: list[BaseRoute] = [] if overview is None else overview.routes
         others: list[BaseRoute] = []
         for one, operator, (_, lost) in zip(serving, operators, starting, strict=True):
@@ -514,7 +556,6 @@ async def _serve(
                 others.append(Mount(one.folder, routes=routes))
             else:
                 first = routes
-        page, ws, known = schemes(certificate)
         joining = None if taught is None else taught.pages(access, clock, shown, page)
         app = application([*(joining.routes if joining else ()), *others, *first], allowed(shown.port), audit=log)
         for part in (sockets.serve(app, listening, tls=tls_of(certificate)), *parts):
@@ -589,6 +630,18 @@ def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | N
         in_order=serving.in_order,
     )  # fmt: skip
     return LiveOperator(config, access, clock=clock, audit=log)
+
+
+def _publisher(published: _Published, serving: _Serving, operator: LiveOperator, address: str) -> Publisher:
+    """What publishes a robot to relays."""
+    from interfaces.relay.network import Network, prefix
+    from interfaces.relay.publisher import Publisher
+    from interfaces.station.chain import described
+
+    return Publisher(
+        operator.hub, operator.clock, operator.scene, Network(published.network, operator.clock),
+        key=prefix(published.site, serving.robot.name), page=described(serving.robot), address=address,
+    )  # fmt: skip
 
 
 def _station(serving: _Serving, all_served: Sequence[_Serving], *, taught: bool) -> Station:

@@ -68,8 +68,24 @@ class SegmentSource:
     delay = 0.0
     """Nothing need be asked for [s]."""
 
-    def __init__(self, port: RemotePort, *, resend: float, lead: float = 0.0) -> None:
-        self._port, self._lead = port, lead
+    def __init__(
+        self,
+        port: RemotePort,
+        *,
+        resend: float,
+        lead: float = 0.0,
+        applied: Callable[[Timeline, int, Change | None], None] = lambda *_: None,
+    ) -> None:
+        """Begin without a timeline.
+
+        Args:
+            port: By which it's followed.
+            resend: After how long without an answer it's asked again [s].
+            lead: How far ahead of what is heard of the engine's time this shows [s].
+            applied: Is called with the copy whenever it's another one: the timeline, its edit's number, and the
+                change that made it of the one before; None where it was fetched as a whole.
+        """
+        self._port, self._lead, self._applied = port, lead, applied
         self._resend = interval_of(resend)
         self._follow = Follow(port.number(), ViewForm.SEGMENTS)
         self._fetching: list[PolynomialSegment] | None = None
@@ -88,6 +104,8 @@ class SegmentSource:
         """The copy; None until the whole timeline so far has come."""
         self.past = -math.inf
         """Up to this time [s] the copy is what happened."""
+        self.gaps = 0
+        """How often edits were missing, and asked for."""
 
     @property
     def span(self) -> tuple[float, float] | None:
@@ -164,11 +182,13 @@ class SegmentSource:
                 self.scene = self.timeline = None
                 self._due = now
                 return
-            self._advance_to(timeline, message.edit, message.command_id)
+            self._advance_to(timeline, message.edit, message)
 
-    def _advance_to(self, timeline: Timeline, edit: int, command_id: int | None) -> None:
+    def _advance_to(self, timeline: Timeline, edit: int, change: Change | None) -> None:
         self.timeline, self.edit = timeline, edit
+        command_id = None if change is None else change.command_id
         self._settled += self._forecasts.edited(timeline, lambda _: command_id)
+        self._applied(timeline, edit, change)
         self._behind = False
         self._held = {base: change for base, change in self._held.items() if base >= edit}
 
@@ -176,6 +196,7 @@ class SegmentSource:
         """Some edit is missing: ask for it, if that hasn't just been done."""
         if not self._behind:
             self._behind = True
+            self.gaps += 1
             self._ask(now)
 
     def _ask(self, now: float) -> None:

@@ -238,6 +238,11 @@ class Journal:
         """What lies before this time doesn't change any more [s]: the present; −∞ for an offline engine."""
         return -math.inf if self.engine.clock is None else self.engine.now()
 
+    @property
+    def is_current(self) -> bool:
+        """Whether this is what the engine does now: of one elsewhere, whether it's heard."""
+        return True
+
     def execute(self, command: Command | None) -> Receipt | None:
         """Let the engine carry out a command, or take back its newest where it's None.
 

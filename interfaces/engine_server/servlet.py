@@ -201,7 +201,8 @@ class ServedTimeline:
         self.look(now=now)
         if self._beat is not None and now >= self._beat - DUE:
             self._beat = now + PULSE
-            self.outbox.append(Pulse(self._edit, now, self.journal.past))
+            if self.journal.is_current:
+                self.outbox.append(Pulse(self._edit, now, self.journal.past))
         message = self._slot.take() if self._slot is not None else None
         if message is not None:
             self.outbox.append(message)
@@ -268,9 +269,9 @@ class ServedTimeline:
     def _send_changes(self, since: int) -> bool:
         """Send every edit after one; whether they are all still there."""
         edits = self.journal.since(since)
-        changes = [edit.change for edit in edits]
         if edits and edits[0].number != since + 1:
             return False
+        changes = [edit.change for edit in edits]
         known = [change for change in changes if change is not None and len(change.segments) <= MOST_CHANGED]
         if len(known) < len(changes):
             return False

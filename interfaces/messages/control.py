@@ -228,6 +228,8 @@ class ProblemCode(enum.StrEnum):
     """The epoch isn't the one in force."""
     STOPPING = "stopping"
     """The server goes."""
+    UNHEARD = "unheard"
+    """A relay doesn't hear the robot's server: connect again later."""
     FAILED = "failed"
     """The server failed at this client's message, and closes its connection: connect again."""
 
@@ -719,6 +721,18 @@ class Corrected(Message, frozen=True, omit_defaults=True, gc=False, tag="correct
     """What keeps the arm from following in time; empty where nothing does."""
 
 
+MOST_RELAYS = 64
+"""Other relays that a viewer is told of."""
+
+
+class Relays(Message, frozen=True, omit_defaults=True, gc=False, tag="relays"):
+    """Sent by a relay: where else the same is relayed. The newest one counts."""
+
+    sender: ClassVar[Party] = Party.SERVER
+    pages: Annotated[tuple[Word, ...], Meta(max_length=MOST_RELAYS)] = ()
+    """Addresses of the other relays' pages, by http or https."""
+
+
 QueueWish: TypeAlias = RequestControl | Withdraw | GiveControl
 """What a client of a class asks of the queue."""
 LeaseWish: TypeAlias = Acquire | TakeOver | Share | Release | Resume | QueueWish
@@ -728,7 +742,18 @@ Question: TypeAlias = (
 )
 """Control messages that a client sends."""
 Notice: TypeAlias = (
-    Welcome | Attached | Lease | Ping | Pong | Problem | State | Network | PathCorrection | Corrected | Present
+    Welcome
+    | Attached
+    | Lease
+    | Ping
+    | Pong
+    | Problem
+    | State
+    | Network
+    | PathCorrection
+    | Corrected
+    | Present
+    | Relays
 )
 """Control messages that a server sends."""
 

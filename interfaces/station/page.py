@@ -57,6 +57,7 @@ class Station:
         robots: Sequence[tuple[str, str, bool]] = (),
         *,
         codes: bool = False,
+        relays: str = "",
     ) -> None:
         """Make the page.
 
@@ -65,8 +66,9 @@ class Station:
             panels: What the page has, see `panels_of`.
             robots: Where the server has several, of each its name, where its page is, and whether that's this one.
             codes: Whether the server tells codes by which a class comes in.
+            relays: Of a relay's page: where the robot is served, and control is to be had.
         """
-        self._page = KeptFile.of(_page(robot, panels, robots, codes=codes).encode())
+        self._page = KeptFile.of(_page(robot, panels, robots, codes=codes, relays=relays).encode())
 
     @property
     def routes(self) -> list[BaseRoute]:
@@ -78,7 +80,12 @@ class Station:
 
 
 def _page(
-    robot: Mapping[str, Any], panels: Sequence[Panel], robots: Sequence[tuple[str, str, bool]], *, codes: bool
+    robot: Mapping[str, Any],
+    panels: Sequence[Panel],
+    robots: Sequence[tuple[str, str, bool]],
+    *,
+    codes: bool,
+    relays: str,
 ) -> str:
     """Its HTML: one element, which the scripts fill, and what those are told."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -87,5 +94,5 @@ def _page(
         loader=PackageLoader("interfaces.station"), undefined=StrictUndefined, trim_blocks=True, autoescape=True
     )
     listed = [{"name": p.name, "title": p.title, "place": p.place, "icon": p.icon} for p in panels]
-    config = json.dumps({"robot": robot, "panels": listed, "robots": robots, "codes": codes})
+    config = json.dumps({"robot": robot, "panels": listed, "robots": robots, "codes": codes, "relays": relays})
     return templates.get_template("index.html").render(config=config)

@@ -44,6 +44,8 @@ class Panel:
     """Of its tab, as Material Icons name it."""
     of: Offer | None = None
     """What a server must have for it; None if any has it."""
+    relayed: bool = True
+    """Whether it's of use to those who watch at a relay, and works there."""
 
     def __post_init__(self) -> None:
         if not self.name.isascii() or not self.name.islower() or not self.name.isalpha():
@@ -53,21 +55,21 @@ class Panel:
 PANELS: Final[tuple[Panel, ...]] = (
     Panel("pane", "3D view", "pane", of=Offer.POLYNOMIALS),
     Panel("floor", "3D view", "pane", of=Offer.ARCS),
-    Panel("drag", "Dragging the tool", "pane", of=Offer.POLYNOMIALS),
+    Panel("drag", "Dragging the tool", "pane", of=Offer.POLYNOMIALS, relayed=False),
     Panel("link", "Connection", "header"),
     Panel("control", "Control", "header"),
     Panel("theme", "Light or dark", "header"),
-    Panel("hints", "Hints", "header"),
-    Panel("stop", "Stop", "header"),
-    Panel("jog", "Jog", "side", icon="open_with", of=Offer.POLYNOMIALS),
-    Panel("drive", "Drive", "side", icon="gamepad", of=Offer.ARCS),
+    Panel("hints", "Hints", "header", relayed=False),
+    Panel("stop", "Stop", "header", relayed=False),
+    Panel("jog", "Jog", "side", icon="open_with", of=Offer.POLYNOMIALS, relayed=False),
+    Panel("drive", "Drive", "side", icon="gamepad", of=Offer.ARCS, relayed=False),
     Panel("map", "Map", "side", icon="map", of=Offer.JOBS),
-    Panel("jobs", "Jobs", "side", icon="checklist", of=Offer.JOBS),
+    Panel("jobs", "Jobs", "side", icon="checklist", of=Offer.JOBS, relayed=False),
     Panel("camera", "Camera", "side", icon="videocam", of=Offer.CAMERA),
-    Panel("receipts", "Receipts", "side", icon="receipt_long", of=Offer.POLYNOMIALS),
+    Panel("receipts", "Receipts", "side", icon="receipt_long", of=Offer.POLYNOMIALS, relayed=False),
     Panel("plots", "Plots", "side", icon="show_chart"),
     Panel("terminal", "Terminal", "side", icon="terminal", of=Offer.TERMINALS),
-    Panel("network", "Link", "side", icon="network_check"),
+    Panel("network", "Link", "side", icon="network_check", relayed=False),
     Panel("record", "Record", "side", icon="fiber_manual_record", of=Offer.RECORDINGS),
     Panel("class", "People", "side", icon="person", of=Offer.QUEUE),
     Panel("strip", "Timeline", "strip", of=Offer.POLYNOMIALS),
@@ -75,10 +77,12 @@ PANELS: Final[tuple[Panel, ...]] = (
 """What pages may have, in the order of their tabs and of the keyboard."""
 
 
-def panels_of(offers: Collection[Offer]) -> tuple[Panel, ...]:
+def panels_of(offers: Collection[Offer], *, relayed: bool = False) -> tuple[Panel, ...]:
     """What the page of a server has.
 
     Args:
         offers: What the server has.
+        relayed: Whether it's a relay's page.
     """
-    return tuple(panel for panel in PANELS if panel.of is None or panel.of in offers)
+    found = (panel for panel in PANELS if panel.of is None or panel.of in offers)
+    return tuple(panel for panel in found if panel.relayed or not relayed)

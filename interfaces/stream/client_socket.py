@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from interfaces.clients.ports import RemotePort
@@ -56,12 +56,13 @@ class Line:
     """One client's connections to a server, one after the other, for those that use it from other threads."""
 
     def __init__(
-        self, url: str, core: ClientCore, clock: Clock, loop: asyncio.AbstractEventLoop, timeout: float
+        self, urls: Sequence[str], core: ClientCore, clock: Clock, loop: asyncio.AbstractEventLoop, timeout: float
     ) -> None:
         """Connect, and wait until the server has said welcome.
 
         Args:
-            url: Of the server's WebSocket, from `server_url`.
+            urls: Of WebSockets of servers of the same robot, from `server_url`: when a connection doesn't come
+                about or ends, the next one is tried.
             core: The client.
             clock: Local time.
             loop: Where it runs, in a thread of its own.
@@ -70,7 +71,8 @@ class Line:
         Raises:
             UnreachableError: If the server doesn't say so within the time, or refuses.
         """
-        self.url, self.core, self.clock = url, core, clock
+        self.url, self.core, self.clock = urls[0], core, clock
+        self._urls, self._tried = tuple(urls), 0
         self.changed = threading.Condition(threading.RLock())
         """Lock of all that the client has, and told of whenever something has come."""
         self.parts: list[ClientPart] = []
@@ -126,7 +128,7 @@ class Line:
         core = self.core
         with self.changed:
             self.changed.wait_for(
-                lambda: core.phase in {Phase.OPEN, Phase.CLOSED} or bool(self.failure), timeout=timeout
+                lambda: core.phase in {Phase.OPEN, Phase.CLOSED} or self._tried >= len(self._urls), timeout=timeout
             )
             if core.phase is not Phase.OPEN:
                 said = core.problem.text if isinstance(core.problem, Problem) else ""
@@ -154,12 +156,13 @@ class Line:
                 refused = isinstance(error, ConnectionRefusedError)
                 reason = "no server listens there" if refused else explained(error, tls=self.url.startswith("wss"))
             with self.changed:
-                self.failure = reason
+                self.failure, self._tried = reason, self._tried + 1
                 self.core.disconnected()
                 self.changed.notify_all()
             with contextlib.suppress(TimeoutError):
                 if not self._closing:
                     await asyncio.wait_for(self._wait_closing(), pause)
+            self.url = self._urls[self._tried % len(self._urls)]
             pause = min(2 * pause, LONGEST_PAUSE)
 
     async def _wait_closing(self) -> None:

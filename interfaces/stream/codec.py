@@ -37,7 +37,9 @@ LARGEST = 65_536
 
 Welcomed: TypeAlias = control.Welcome | MobileWelcome
 """What greets a client: of an arm's server, of a mobile robot's."""
-News: TypeAlias = control.State | Postures | control.Network | Tasks | Seen | Plan | control.Present
+News: TypeAlias = (
+    control.State | Postures | control.Network | Tasks | Seen | Plan | control.Present | control.Relays
+)
 """What is told of the robot and the way to it: of each kind the newest counts."""
 Value: TypeAlias = (
     Request | Reply | Question | Notice | Welcomed | Postures | TaskOrder | News

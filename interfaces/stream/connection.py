@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
 from typing import Self, TypeVar
@@ -58,7 +58,9 @@ class Connection:
     come from any thread. What a robot of the other kind does is refused as the server answers it.
     """
 
-    def __init__(self, url: str, client: Callable[..., ClientCore], *, role: Role, timeout: float) -> None:
+    def __init__(
+        self, url: str | Sequence[str], client: Callable[..., ClientCore], *, role: Role, timeout: float
+    ) -> None:
         """Connect; see `interfaces.connect`.
 
         Args:
@@ -71,8 +73,12 @@ class Connection:
             UnreachableError: If there's no answer, or the server refuses.
             InvalidValueError, FormatError: If the address is none, or plain off this machine; see `peer`.
         """
-        self._url, self._client, self._timeout = server_url(url), client, timeout
-        peer(self._url)
+        given = (url,) if isinstance(url, str) else tuple(url)
+        if not given:
+            raise InvalidValueError("url", given, "at least one address")
+        self._urls, self._client, self._timeout = tuple(map(server_url, given)), client, timeout
+        for one in self._urls:
+            peer(one)
         self._clock = WallClock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="vrs-client", daemon=True)
@@ -91,7 +97,7 @@ class Connection:
         """Both."""
 
     def _open(self, role: Role) -> Line:
-        self._sessions.append(Line(self._url, self._client(role=role), self._clock, self._loop, self._timeout))
+        self._sessions.append(Line(self._urls, self._client(role=role), self._clock, self._loop, self._timeout))
         return self._sessions[-1]
 
     def __enter__(self) -> Self:

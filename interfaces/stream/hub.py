@@ -154,6 +154,8 @@ class HubConfig:
     limits: ClientLimits = field(default_factory=ClientLimits)
     in_order: bool = False
     """Whether operators get control in the order in which they connect: they queue for it from then on."""
+    relays: str = ""
+    """Where the robot is served that this hub only relays: whoever comes here watches. Empty: it's served here."""
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.state_rate <= 1000:
@@ -734,6 +736,8 @@ class Hub:
         refusal = admission.refusal
         if not refusal and role not in _SERVED:
             refusal = f"nothing is here for the role {role}"
+        if self.config.relays and role is not Role.VIEWER:
+            refusal = f"this is a relay for viewers: control is to be had at {self.config.relays}"
         if refusal:
             return Problem(ProblemCode.REFUSED, refusal)
         seat = self._seats.get(hello.session or "")

@@ -86,6 +86,8 @@ class SocketLimits:
     """Time for a WebSocket to show who it is, from its upgrade [s], 0.01 to 60."""
     blocked: Annotated[float, within(0.01, 60, "s")] = 10.0
     """A connection is cut off when it hasn't taken HIGH − LOW bytes for so long [s], 0.01 to 60."""
+    backlog: Annotated[int, within(1, 4096)] = BACKLOG
+    """Connections that wait to be accepted, 1 to 4096."""
 
 
 _Phase: TypeAlias = Literal["header", "body", "answer"]
@@ -519,6 +521,7 @@ async def serve(
         limits: Of connections.
         tls: Gives what a handshake is done by, as `ServerTls.context` does; None: nothing is encrypted.
     """
+    limits = SocketLimits() if limits is None else limits
     config = uvicorn.Config(
         app,  # type: ignore[arg-type]
         http=BoundedHttp,
@@ -531,12 +534,12 @@ async def serve(
         server_header=False,
         date_header=False,
         timeout_graceful_shutdown=1,
-        backlog=BACKLOG,
+        backlog=limits.backlog,
     )
     server = uvicorn.Server(config)
     # Signals are left to whoever runs it.
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
-    server.server_state = state = ConnectionState(SocketLimits() if limits is None else limits)
+    server.server_state = state = ConnectionState(limits)
     looking = [asyncio.create_task(look(state)) for look in (_cut_off_overdue, end_admissions)]
     task = asyncio.create_task(server.serve(sockets=[listening] if tls is None else []))
     try:

@@ -246,7 +246,7 @@ class Child:
 @contextlib.contextmanager
 def child(*arguments: str) -> Iterator[Child]:
     """Run a `vrs` command that says where it listens; it's ended in the end, or when this process is killed."""
-    ends = ("--until-eof",) if arguments[0] in {"serve", "robot"} else ()
+    ends = ("--until-eof",) if arguments[0] in {"serve", "robot", "view"} else ()
     process = subprocess.Popen(
         [sys.executable, "-m", "interfaces.cli", *arguments, *ends],
         stdin=subprocess.PIPE,

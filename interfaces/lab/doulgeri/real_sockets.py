@@ -133,7 +133,7 @@ def _line(port: int, loop: asyncio.AbstractEventLoop) -> Line:
     from interfaces.stream.codec import Encoding
 
     core = ClientCore(expects=Welcome, role=Role.VIEWER, name="viewer", token=None, encoding=Encoding.MSGPACK)
-    return Line(f"ws://127.0.0.1:{port}/ws", core, WallClock(), loop, 10.0)
+    return Line((f"ws://127.0.0.1:{port}/ws",), core, WallClock(), loop, 10.0)
 
 
 def _lacking(lines: list[Line], logs: list[PortLog], length: float) -> float:

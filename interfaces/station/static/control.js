@@ -56,7 +56,9 @@ export function Panel({ station }) {
     ${button("withdraw", offered ? "Not now" : "Leave the queue", queued && (offered || waiting), () => session.wish("withdraw"))}
     ${button("give", "Give back", holds, () => ask("release"))}
     ${button("take-over", "Take over", welcome?.role === "admin" && lease.state === "held" && !holds, () => setAsking(true))}
-    <${Name} station=${station} />
+    ${session.relays
+      ? html`<a id="served" href=${session.relays} title="This relay is for watching: control is to be had there">The robot's own page</a>`
+      : html`<${Name} station=${station} />`}
     ${asking && html`<${TakeOver} holder=${lease.holder} ask=${ask} close=${() => setAsking(false)} />`}`;
 }
 

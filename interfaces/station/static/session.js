@@ -13,6 +13,8 @@ const LOOK = 100;
 const HELD_UP = 0.4;
 const LONGEST_WAIT = 1500;
 const PINGS = 10;
+/** A relay that can't be reached so often is left for another one. */
+const MOST_TRIES = 1;
 const KEY = "vrs-session";
 /** Tokens are longer than a class's codes. */
 const SHORTEST_TOKEN = 20;
@@ -26,10 +28,13 @@ const seconds = () => performance.now() / 1000;
  * "network" (the way to the robot), "rerouted" (that it has changed), "order" and "outcome" (of commands), "wish" (a request), "problem" (what couldn't be done), "locked" (a token is asked for).
  */
 export class Session extends EventTarget {
-  /** @param {{name: string, token: ?string}} who */
-  constructor({ name, token }) {
+  /** @param {{name: string, token: ?string, relays: string}} who and where the robot is served, for a relay's page */
+  constructor({ name, token, relays }) {
     super();
     this.token = token;
+    this.relays = relays;
+    /** Pages of the other relays. */
+    this.others = [];
     /** Type of the message that lets this page in. */
     this.welcomes = "welcome";
     observed(this, {
@@ -51,7 +56,7 @@ export class Session extends EventTarget {
     this.orders = new Orders((message) => this.send(message));
     /** Whether a token was just given at the door, and nobody has been let in by it yet. */
     this.entered = false;
-    this.roles = token ? [...ROLES] : ["operator", "viewer"];
+    this.roles = this.wanted(token);
     this.requests = 0;
     this.pings = 0;
     this.tries = 0;
@@ -97,9 +102,14 @@ export class Session extends EventTarget {
   unlock(token) {
     this.token = token;
     this.entered = true;
-    this.roles = token ? [...ROLES] : ["operator", "viewer"];
+    this.roles = this.wanted(token);
     this.become("connecting");
     this.connect();
+  }
+
+  /** Roles to ask for, one after the other: at a relay one watches. */
+  wanted(token) {
+    return this.relays ? ["viewer"] : token ? [...ROLES] : ["operator", "viewer"];
   }
 
   connect() {
@@ -135,6 +145,11 @@ export class Session extends EventTarget {
       return;
     }
     this.become("lost");
+    // A relay that's gone: the page of another one has the same. Who is merely told that the robot's server is gone stays.
+    if (this.tries >= MOST_TRIES && this.others.length && !this.unheard) {
+      location.replace(this.others[Math.floor(Math.random() * this.others.length)]);
+      return;
+    }
     this.again = setTimeout(() => this.connect(), Math.min(LONGEST_WAIT, 200 * 2 ** this.tries++));
   }
 
@@ -178,6 +193,8 @@ export class Session extends EventTarget {
       if (before && message.changed_at !== before.changed_at) this.emit("rerouted", message);
     } else if (message.type === "present") {
       this.present = message;
+    } else if (message.type === "relays") {
+      this.others = message.pages;
     } else if (message.type === "outcome") {
       const entry = this.orders.answer(message);
       if (entry) this.emit("outcome", entry);
@@ -204,6 +221,7 @@ export class Session extends EventTarget {
     }
     this.greeted = true;
     this.tries = 0;
+    this.unheard = false;
     this.welcome = welcome;
     this.key = welcome.session;
     this.roles = [welcome.role];
@@ -241,6 +259,7 @@ export class Session extends EventTarget {
       return;
     }
     if (problem.fatal) this.key = null;
+    this.unheard = problem.code === "unheard";
     this.emit("problem", problem);
   }
 

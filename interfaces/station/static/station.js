@@ -21,7 +21,11 @@ class Station extends EventTarget {
     this.drives = config.robot.segments === "arcs";
     /** Links and tool at joints; a robot that drives has none. */
     this.chain = this.drives ? null : new Chain(config.robot);
-    this.session = new (this.drives ? DriveSession : Session)({ name: myName(), token: sessionStorage.getItem("token") });
+    this.session = new (this.drives ? DriveSession : Session)({
+      name: myName(),
+      token: sessionStorage.getItem("token"),
+      relays: config.relays,
+    });
     this.layout = new Layout(config.panels);
     observed(this, {
       // What is said to those who listen to the page.
@@ -59,6 +63,7 @@ class Station extends EventTarget {
     const { link, holds, lease, mayCommand } = this.session;
     if (link !== "live") return "No connection.";
     if (holds) return "";
+    if (this.session.relays) return "This relay is for watching: control is to be had at the robot's own page.";
     if (!mayCommand) return "You are here to watch.";
     return lease.state === "held" ? `${lease.holder} has control.` : "Take control first, in the bar above.";
   }

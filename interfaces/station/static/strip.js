@@ -178,7 +178,7 @@ function Tools({ strip }) {
     ${tool("redo", "redo", "Take back the newest undo", () => session.order({ type: "redo" }), "Redo", { why: idle })}
     <span class="gap"></span>
     ${tool("save", "download", "Save what is planned to a plan file", () => savePlan(station), "Save",
-      { why: isPlanned(session) ? "" : "nothing is planned that could be saved" })}
+      { why: session.relays ? idle : isPlanned(session) ? "" : "nothing is planned that could be saved" })}
     <${Loader} strip=${strip} tool=${tool} />
     <span class="gap"></span>
     ${tool("delete", "delete", "Take the chosen move out of the plan", () => strip.remove(chosen), "Delete", { why })}

@@ -25,13 +25,14 @@ class Newest:
     Putting never waits. A reader costs a number: the version that it has read up to.
     """
 
-    def __init__(self, greeting: bytes) -> None:
+    def __init__(self, greeting: bytes, most: int = MOST_READERS) -> None:
         """Start without values.
 
         Args:
             greeting: What each reader gets before anything else.
+            most: Most readers.
         """
-        self.greeting = greeting
+        self.greeting, self._most = greeting, most
         self.version = 0
         """Counts up with each change of any value."""
         self.values: dict[str, tuple[int, bytes]] = {}
@@ -68,8 +69,8 @@ class Newest:
         Raises:
             InvalidValueError: If there are too many.
         """
-        if len(self._slots) >= MOST_READERS:
-            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {MOST_READERS} a scene")
+        if len(self._slots) >= self._most:
+            raise InvalidValueError("viewers", len(self._slots) + 1, f"at most {self._most} a scene")
         slot = ReaderPosition(self, changed)
         self._slots.add(slot)
         return slot
@@ -82,13 +83,17 @@ class Newest:
         """Values newer than a version, the oldest first; readers at the same version share the answer."""
         found = self._later.get(version)
         if found is None:
-            newer = []
-            for of, data in reversed(self.values.values()):
-                if of <= version:
-                    break
-                newer.append(data)
-            found = self._later[version] = tuple(reversed(newer))
+            found = self._later[version] = tuple(data for _, data in self.entries(version))
         return found
+
+    def entries(self, version: int) -> list[tuple[str, bytes]]:
+        """The same with their keys."""
+        newer = []
+        for key, (of, data) in reversed(self.values.items()):
+            if of <= version:
+                break
+            newer.append((key, data))
+        return newer[::-1]
 
     def version_of(self, count: int, version: int) -> int:
         """Version of the last of the first `count` values newer than a version."""
@@ -148,9 +153,13 @@ _encoder = msgspec.msgpack.Encoder(enc_hook=_ext)
 class Nodes(Newest):
     """A scene's nodes by MeshCat's commands: everything once, then what changes."""
 
-    def __init__(self) -> None:
-        """Begin with nothing to be seen."""
-        super().__init__(_encoder.encode({"type": "delete", "path": ROOT}))
+    def __init__(self, most: int = MOST_READERS) -> None:
+        """Begin with nothing to be seen.
+
+        Args:
+            most: Most readers.
+        """
+        super().__init__(_encoder.encode({"type": "delete", "path": ROOT}), most)
         self._others: list[tuple[Nodes, str, frozenset[str] | None]] = []
         """Scenes in which this one's robots are seen, too, below which node there, and what of them."""
 

@@ -71,7 +71,7 @@ function map(x, where, check) {
 const STATUS = new Set(["accepted", "postponed", "rejected"]);
 const REFUSAL_CODE = new Set(["other", "overruled", "not-following"]);
 const FRAME_STATUS = new Set(["predicted", "confirmed", "falsified"]);
-const PROBLEM_CODE = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "failed"]);
+const PROBLEM_CODE = new Set(["malformed", "unknown-type", "not-allowed", "out-of-range", "too-large", "too-fast", "hello-expected", "hello-late", "version", "refused", "full", "lease", "stale-epoch", "stopping", "unheard", "failed"]);
 const LEASE_STATE = new Set(["free", "held", "ending"]);
 const LEASE_END = new Set(["released", "expired", "taken over"]);
 const ROLE = new Set(["viewer", "operator", "admin", "site"]);
@@ -434,6 +434,14 @@ function checkPresent(m) {
   return m;
 }
 
+/** Server: Sent by a relay: where else the same is relayed. The newest one counts. */
+function checkRelays(m) {
+  map(m, "relays");
+  if (m.type !== undefined && m.type !== "relays") fail("relays", "relays");
+  m.pages = m.pages === undefined ? [] : list(m.pages, 0, 64, "relays.pages", (x) => text(x, 0, 200, "relays.pages")); // Addresses of the other relays' pages, by http or https.
+  return m;
+}
+
 /** How fast a mobile robot may be commanded, and how fast that may change. */
 function checkDriveLimits(m) {
   map(m, "DriveLimits");
@@ -669,6 +677,7 @@ const CHECKS = new Map([
   ["state", checkState],
   ["network", checkNetwork],
   ["present", checkPresent],
+  ["relays", checkRelays],
   ["mobile-welcome", checkMobileWelcome],
   ["postures", checkPostures],
   ["tasks", checkTasks],
