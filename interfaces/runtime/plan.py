@@ -29,8 +29,8 @@ from vrs.commands import (
     Target,
 )
 from vrs.engine import Engine
-from vrs.errors import FormatError, InvalidValueError, UnreachablePoseError
-from vrs.model import Array, RobotModel, home
+from vrs.errors import FormatError, InvalidValueError, OutOfLimitsError, UnreachablePoseError
+from vrs.model import Array, RobotModel, for_people, home
 from vrs.notes import NoteCode
 
 SCHEMA = "vrs-plan/1"
@@ -327,7 +327,13 @@ def _target(move: _Move, model: RobotModel) -> Target:
             units = "deg" if not model.prismatic else "deg, of prismatic joints m"
             raise InvalidValueError("move", move, f"{n} finite joint values [{units}]")
         target = JointTarget([x if j in model.prismatic else math.radians(x) for j, x in enumerate(move)])
-        model.limits.check(target.q, model.prismatic)
+        try:
+            model.limits.check(target.q, model.prismatic)
+        except OutOfLimitsError as error:
+            (low, unit), (high, _) = (
+                for_people(error.joint, limit, model.prismatic) for limit in (error.low, error.high)
+            )
+            raise OutOfLimitsError(error.joint, move[error.joint], low, high, unit) from None
         return target
     if move.pose is not None:
         if move.xyz is not None or move.zyz_deg is not None or move.configuration is not None:

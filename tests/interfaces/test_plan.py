@@ -173,7 +173,7 @@ def test_a_plan_has_an_end():
         ('{"speed": 1}', "one of move, payload, release"),
         ('{"issue": 1, "move": [0,0,0,0,0]}', "6 finite joint values"),
         ('{"issue": 1, "move": [0,0,0,0,0,"a"]}', "float"),
-        ('{"issue": 1, "move": [170,0,0,0,0,0]}', "joint 1 must be within"),
+        ('{"issue": 1, "move": [170,0,0,0,0,0]}', r"joint 1 must be within \[-160, 160\] deg; given: 170"),
         ('{"issue": 1, "move": {"pose": "nowhere"}}', "one of nominal, ready, stretch, zero"),
         ('{"issue": 1, "move": {"pose": "ready", "xyz": [0,0,0]}}', "pose alone"),
         ('{"issue": 1, "move": {"xyz": [0.4,0,0]}}', "zyz_deg must be three finite numbers"),
