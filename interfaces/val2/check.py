@@ -306,8 +306,7 @@ def _strange_angles(source: SourceFile, *, said: bool) -> Iterator[CheckFinding]
     for program in source.programs:
         for i in (step.statement for step in program.steps):
             words += [i] if i.keyword in _VPLUS_ALONE else []
-            operands = (one for one in i.operands if isinstance(one, Apply | Compound))
-            inner = [part for operand in operands for part in parts(operand)]
+            inner = [part for expression in i.expressions for part in parts(expression)]
             angles += [
                 (literal(part.arguments[4]) if len(part.arguments) > 4 else None, part.at, program.dialect)
                 for part in inner

@@ -140,24 +140,18 @@ class Expressions:
 
     def read(self, variable: Variable, *, location: bool = False) -> Closure:
         """The value of a variable, whatever it is."""
-        place = self.slot(variable.name)
-        key = self.key(variable) if variable.indices else None
+        found, key = self.found(variable), self.key(variable) if variable.indices else None
         row = None if variable.indices else UNRESERVED.get(variable.name.upper())
         standing = None if row is None else self._function(Apply(row.name, (), variable.at))
 
         def value(s: Slots) -> Value:
-            slot: VariableSlot | None = s[place] if isinstance(place, int) else place
-            k = None
-            if key is not None:
-                assert slot is not None
-                k = key(s)
-                slot = slot.elements.get(k) if slot.elements else None
-            if slot is None or slot.value is None:
-                if standing is not None:
-                    value: Value = standing(s)
-                    return value
-                raise unset(variable, k, location=location)
-            return slot.value
+            slot: VariableSlot | None = found(s)
+            if slot is not None and slot.value is not None:
+                return slot.value
+            if standing is None:
+                raise unset(variable, None if key is None else key(s), location=location)
+            value: Value = standing(s)
+            return value
 
         return value
 
@@ -242,13 +236,11 @@ class Expressions:
 
         return compound
 
-    def operands(
-        self, slots: Sequence[OperandSlot], given: Sequence[Expression | Format | None], word: str, at: TextPosition
-    ) -> list[Closure]:
-        """Closures of the operands of an instruction or a function, as its slots say.
+    def operands(self, slots: Sequence[OperandSlot], given: Sequence[Expression | Format | None]) -> list[Closure]:
+        """Closures of the operands of an instruction or a function, as its slots say, which have counted them.
 
         Raises:
-            ValError: If one is missing, or of another kind.
+            ValError: If one is of another kind.
         """
         made: list[Closure] = []
         for i in range(max(len(given), len(slots)) if slots else 0):
@@ -267,7 +259,7 @@ class Expressions:
             slots = (OperandSlot("", "string" if texts else "real"),)
             act = operator.add if texts and row.name == "+" else act
             act = partial(self._compared, act) if texts and row.gives == "truth" else act
-        parts = self.operands(slots, given, row.name, e.at)
+        parts = self.operands(slots, given)
         if "context" in row.tags:
             return _placed(partial(act, self.context), parts, e.at)
         if "dialect" in row.tags:
@@ -313,11 +305,19 @@ def _placed(function: Callable[..., Any], parts: Sequence[Closure], at: TextPosi
 # Functions of names.
 
 
+def _named(e: Apply) -> Variable:
+    """The variable that a function of a name is of.
+
+    Raises:
+        ValError: If it's something else.
+    """
+    if isinstance(variable := e.arguments[0], Variable):
+        return variable
+    raise ValError("Invalid expression", f"{e.function} takes a name first: {row_of(e).usage}", place=e.at)
+
+
 def _defined(x: Expressions, e: Apply) -> Callable[[Slots], float]:
-    variable = e.arguments[0]
-    if not isinstance(variable, Variable):
-        raise ValError("Invalid expression", "DEFINED takes a name", place=e.at)
-    found = x.found(variable)
+    found = x.found(_named(e))
 
     def defined(s: Slots) -> float:
         slot = found(s)
@@ -327,8 +327,8 @@ def _defined(x: Expressions, e: Apply) -> Callable[[Slots], float]:
 
 
 def _last(x: Expressions, e: Apply) -> Callable[[Slots], float]:
-    variable = e.arguments[0]
-    if not isinstance(variable, Variable) or variable.indices:
+    variable = _named(e)
+    if variable.indices:
         raise ValError("Invalid expression", "LAST takes an array", place=e.at)
     found = x.found(variable)
 
@@ -342,10 +342,8 @@ def _last(x: Expressions, e: Apply) -> Callable[[Slots], float]:
 
 def _setting(x: Expressions, e: Apply) -> Callable[[Slots], float]:
     """SWITCH and PARAMETER."""
-    variable, kind = e.arguments[0], e.function.lower()
-    if not isinstance(variable, Variable):
-        raise ValError("Invalid expression", f"{e.function} takes a name", place=e.at)
-    name, values = variable.name.upper(), x.context.switches if kind == "switch" else x.context.parameters
+    name, kind = _named(e).name.upper(), e.function.lower()
+    values = x.context.switches if kind == "switch" else x.context.parameters
     if name not in values:
         raise ValError(f"Unknown {kind}", name, place=e.at)
     return lambda _: (TRUE if values[name] else 0.0) if kind == "switch" else values[name]
@@ -357,11 +355,9 @@ def _encode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
 
 
 def _decode(x: Expressions, e: Apply) -> Callable[[Slots], str]:
-    source = e.arguments[0]
-    if not isinstance(source, Variable):
-        raise ValError("Invalid expression", "$DECODE takes a string variable first", place=e.at)
+    source = _named(e)
     read, slot = x.of_kind("string", source), x.reference(source)
-    marks, skip = x.operands(FUNCTIONS["$DECODE"].slots[1:], e.arguments[1:], e.function, e.at)
+    marks, skip = x.operands(FUNCTIONS["$DECODE"].slots[1:], e.arguments[1:])
 
     def decode(s: Slots) -> str:
         text: str
@@ -401,7 +397,7 @@ def packed(
 
 
 def _unpack(x: Expressions, e: Apply) -> Callable[[Slots], str]:
-    first, count = x.operands(FUNCTIONS["$UNPACK"].slots[1:], e.arguments[1:], e.function, e.at)
+    first, count = x.operands(FUNCTIONS["$UNPACK"].slots[1:], e.arguments[1:])
     part = packed(x, e.arguments[0], first, count)  # type: ignore[arg-type]
 
     def unpack(s: Slots) -> str:

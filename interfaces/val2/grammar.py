@@ -232,8 +232,8 @@ def _number(text: str, at: TextPosition) -> Number:
 def _roots(found: Any) -> list[Expression]:
     """The expressions of what was read."""
     match found:
-        case (_, Instruction(operands=operands, begins=begins), _):
-            return [one for one in (*operands, begins) if one is not None and not isinstance(one, Format)]
+        case (_, Instruction() as statement, _):
+            return statement.expressions
         case SignalRule(value=value):
             return [value]
     return [found]
@@ -355,9 +355,6 @@ class _Trees:
         called = self.call([keyword, name, given])
         return replace(called, operands=(*before, *called.operands))
 
-    def unit(self, parts: list[Any]) -> list[Any]:
-        return parts
-
     def device(self, parts: list[Any]) -> Instruction:
         """What is done with a logical unit: operands in parentheses, then others."""
         keyword, unit, *others = parts
@@ -473,11 +470,8 @@ class _Trees:
             raise _misplaced(token, _at(token))
         return Variable(name_of(token), tuple(indices or ()), _at(token), array=indices == [])
 
-    def indices(self, parts: list[Any]) -> list[Any]:
-        return parts
-
-    def arguments(self, parts: list[Any]) -> list[Any]:
-        return parts
+    unit: Final = staticmethod(list[Any])
+    indices = arguments = unit
 
     def apply(self, parts: list[Any]) -> Apply:
         token, given = parts

@@ -106,7 +106,7 @@ class ProgramCompiler(Expressions):
         slots, c = STATEMENTS[i.keyword].slots, self.context
         if i.keyword == "BASE" and stands_for_frame(i):
             slots = (OperandSlot("transformation", "frame"),)
-        values = self.operands(slots, i.operands, i.keyword, i.at)
+        values = self.operands(slots, i.operands)
 
         def prepare(s: Slots) -> Ask:
             given = [value(s) for value in values]
@@ -294,7 +294,7 @@ def _take_arm(c: Context, following: int) -> Pause[int]:
 def _attach(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """ATTACH a logical unit; without a device and a number it's the arm."""
     c, target = x.context, i.operands[0] if i.operands else None
-    unit, mode, device = x.operands(STATEMENTS[i.keyword].slots, i.operands, i.keyword, i.at)
+    unit, mode, device = x.operands(STATEMENTS[i.keyword].slots, i.operands)
     slot = x.reference(target) if isinstance(target, Variable) else None
 
     def attach(s: Slots) -> Action:
@@ -325,7 +325,7 @@ def _detach(c: Context, _: Instruction, unit: float) -> Pause[None]:
 def _read(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """READ a line of a file, or of the terminal."""
     c, names = x.context, i.operands[3:]
-    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3])
     asking = _asking(x, names)
     slots = [x.reference(v) for v in names]
 
@@ -346,7 +346,7 @@ def _read(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 def _write(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     c, items = x.context, _items(x, i.operands[3:])
-    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+    unit, *_ = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3])
 
     def write(s: Slots) -> int:
         text, number = items(s), whole(unit(s))
@@ -741,7 +741,7 @@ def _call(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 def _execute(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """EXECUTE, PCEXECUTE; PRIME, which stands before the first step."""
     c, called = x.context, _called(x, i)
-    numbers = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3], i.keyword, i.at)
+    numbers = x.operands(STATEMENTS[i.keyword].slots[:3], i.operands[:3])
 
     def execute(s: Slots) -> int:
         task, cycles, step = (number(s) for number in numbers)
@@ -821,23 +821,14 @@ def _assign(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
 
 def _assign_integer(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """SETI of VAL, whose numbers are integers."""
-    (name, e), memory = i.operands, x.context.memory
-    if name.prefix:
-        raise mismatch(name)
-    slot, read = x.reference(name), x.of_kind("real", e)
-
-    def assign(s: Slots) -> int:
-        value = float(whole(read(s)))
-        memory.store(slot(s), value, name)
-        return n + 1
-
-    return assign
+    name, e = i.operands
+    return _assign(x, replace(i, operands=(name, Apply("INT", (e,), e.at))), n)
 
 
 def _pack(x: ProgramCompiler, i: Instruction, n: int) -> StepFunction:
     """PACK a string into the text that an array's elements hold one after the other."""
     target, *others = i.operands
-    first, count, new = x.operands(STATEMENTS["PACK"].slots[1:], others, i.keyword, i.at)
+    first, count, new = x.operands(STATEMENTS["PACK"].slots[1:], others)
     part = packed(x, target, first, count)
 
     def pack(s: Slots) -> int:
@@ -1028,12 +1019,10 @@ _ROWS: Final = (
          _setting(lambda c, i: c.arm.set_nulling(True, always=_always(i))), words="ALWAYS"),
     Form("NONULL", "", "The next motion ends without waiting for the real arm; ALWAYS: each.", "VAL",
          _setting(lambda c, i: c.arm.set_nulling(False, always=_always(i))), words="ALWAYS"),
-    Form("RIGHTY", "", "The arm is to be right-handed from the next MOVE on.", "VAL", _setting(_configure)),
-    Form("LEFTY", "", "The arm is to be left-handed from the next MOVE on.", "VAL", _setting(_configure)),
-    Form("ABOVE", "", "The elbow is to be above from the next MOVE on.", "VAL", _setting(_configure)),
-    Form("BELOW", "", "The elbow is to be below from the next MOVE on.", "VAL", _setting(_configure)),
-    Form("FLIP", "", "The wrist is to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
-    Form("NOFLIP", "", "The wrist is not to be flipped from the next MOVE on.", "VAL", _setting(_configure)),
+    *(Form(name, "", f"{what} from the next MOVE on.", "VAL", _setting(_configure))
+      for name, what in (("RIGHTY", "The arm is to be right-handed"), ("LEFTY", "The arm is to be left-handed"),
+                         ("ABOVE", "The elbow is to be above"), ("BELOW", "The elbow is to be below"),
+                         ("FLIP", "The wrist is to be flipped"), ("NOFLIP", "The wrist is not to be flipped"))),
     *(Form(name, "", f"{what} the end of the next motion; ALWAYS: of each.", "VAL-II", _setting(_path),
            words="ALWAYS", tags="reading")
       for name, what in (("CPON", "The arm goes round"), ("CPOFF", "The arm stops at"))),

@@ -1,4 +1,4 @@
-"""Rows of the table of the language: instructions, functions, operators, monitor commands, switches, parameters.
+"""Rows of the table of the language: instructions, functions, operators, switches, parameters.
 
 A row says how a word is written, what it does in a line, whose it is, where it's allowed, and what carries it out.
 Parser, printer, compiler, checker, help and completion read rows alone; `forms.py` has all of them.
@@ -74,7 +74,7 @@ class Form:
             explanation: What it does, a line.
             origin: Where it's known from.
             act: Carries it out: of a function, takes the arguments' values; of an instruction, makes the closure
-                of a step; of a monitor command, takes the terminal and what follows the name.
+                of a step.
             words: What may stand behind the operands, in their order, one of each group at most: `MMPS|IPS ALWAYS`.
             usage: How it's written, where that isn't told by the slots.
             rule: How an instruction's line goes on behind its keyword: what `grammar.lark` has behind this word, in
@@ -84,7 +84,7 @@ class Form:
                 instruction `opens`, `closes` (a structure; both: divides one), `program` (it can't stand alone),
                 `beside` (DO may do it while a program runs), `whole` (it isn't abbreviated); of a function
                 `unreserved` (see `functions.UNRESERVED`); of both `reading` (no source could be read that has more
-                than the word: the form is our reading); of a monitor command what `monitor/commands.py` says.
+                than the word: the form is our reading).
             level: How tightly an operator binds.
         """
         operands, _, gives = spelled.partition("-> ")

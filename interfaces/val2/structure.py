@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, get_args
 
 from interfaces.val2.errors import TextPosition, ValError
 from interfaces.val2.syntax import Instruction, Number, Program, Step
 
 BlockKind: TypeAlias = Literal["IF", "WHILE", "DO", "FOR", "CASE"]
-_KINDS: Final = ("IF", "WHILE", "DO", "FOR", "CASE")
+_KINDS: Final = get_args(BlockKind)
 _LOOPS: Final = ("WHILE", "DO", "FOR")
 DEEPEST: Final = 100
 """Most levels of structure."""

@@ -133,6 +133,11 @@ class Instruction:
     """The rest of the line as it was written, where it's recognised but has no meaning here: it's passed over,
     with a warning."""
 
+    @property
+    def expressions(self) -> list[Expression]:
+        """Those that it's made of, none that was left out."""
+        return [one for one in (*self.operands, self.begins) if one is not None and not isinstance(one, Format)]
+
 
 BLANK: Final = Instruction("")
 """Nothing, or a comment alone."""

@@ -15,7 +15,7 @@ from interfaces.runtime.session import PATIENCE, ArmFactory, Progress, TwinSessi
 from interfaces.val2.corrections import Corrections
 from interfaces.val2.errors import ValError
 from interfaces.val2.motion import Arm, SiteRobot, conventions_of
-from interfaces.val2.playing import Listeners, Player
+from interfaces.val2.playing import LONGEST, Listeners, Player
 from interfaces.val2.source import SourceFile
 from interfaces.val2.units import Units
 from robots.robot import Robot
@@ -24,8 +24,6 @@ from vrs.commands import Command, Grip, MotionCommand, PlanEdit, SteerCommand
 from vrs.ledger import Receipt, Status
 from vrs.model import home
 
-LONGEST: Final = 600.0
-"""How long a program may take [s], by default."""
 _LOOK: Final = 0.1
 """How often a program is looked after at least [s]: reports may have changed what it waits for."""
 

@@ -55,6 +55,11 @@ class _Unit:
     sent: str | None = None
     """What went over a serial line; None of a file."""
 
+    @property
+    def written(self) -> str:
+        """What its file is to hold."""
+        return self.text if self.sent is None else self.sent
+
 
 class Units:
     """The units of a controller."""
@@ -162,13 +167,18 @@ class Units:
 
     def close(self, unit: int) -> None:
         """FCLOSE."""
+        if (known := self._open(unit)) is not None:
+            assert known.path is not None
+            self._status[unit] = self._write(known.path, known.written) if known.writes else DONE
+            self._units[unit] = _Unit()
+
+    def _open(self, unit: int) -> _Unit | None:
+        """A unit whose file is open; of any other IOSTAT says that it isn't."""
         known = self._units.get(unit)
         if known is None or known.path is None:
             self._status[unit] = NOT_OPEN
-            return
-        text = known.text if known.sent is None else known.sent
-        self._status[unit] = self._write(known.path, text) if known.writes else DONE
-        self._units[unit] = _Unit()
+            return None
+        return known
 
     def delete(self, unit: int, name: str) -> None:
         """FDELETE a file."""
@@ -192,21 +202,19 @@ class Units:
 
     def read(self, unit: int) -> str | None:
         """READ: the next line of a file; None where there's none."""
-        known = self._units.get(unit)
-        if known is None or known.path is None or known.place >= len(known.text):
-            self._status[unit] = ENDED if known is not None and known.path is not None else NOT_OPEN
+        if (known := self._open(unit)) is None:
+            return None
+        self._status[unit] = DONE if known.place < len(known.text) else ENDED
+        if known.place >= len(known.text):
             return None
         end = known.text.find("\n", known.place)
         line = known.text[known.place : len(known.text) if end < 0 else end]
         known.place += len(line) + 1
-        self._status[unit] = DONE
         return line
 
     def seek(self, unit: int, line: int) -> None:
         """FSEEK: go to the beginning of a line, from 1."""
-        known = self._units.get(unit)
-        if known is None or known.path is None:
-            self._status[unit] = NOT_OPEN
+        if (known := self._open(unit)) is None:
             return
         lines = known.text.splitlines(keepends=True)
         there = 1 <= line <= len(lines)
@@ -229,10 +237,12 @@ class Units:
 
     def write(self, unit: int, text: str) -> None:
         """WRITE: add to a file."""
-        known = self._units.get(unit)
-        if known is None or known.path is None or not known.writes:
+        if (known := self._open(unit)) is None:
+            return
+        assert known.path is not None
+        if not known.writes:
             self._status[unit] = NOT_OPEN
-        elif len(known.text if known.sent is None else known.sent) + len(text) > LARGEST:
+        elif len(known.written) + len(text) > LARGEST:
             self._status[unit] = NOT_READY
         elif known.sent is None:
             known.text += text

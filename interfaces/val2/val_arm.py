@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from typing_extensions import override
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
     from interfaces.val2.playing import Rehearsal
     from vrs.timeline import Timeline
 
-LONGEST: Final = 600.0
-"""A program may take so long [s]."""
 Task: TypeAlias = Callable[[], "Rehearsal | str"]
 Beside: TypeAlias = Callable[[Task], "Future[Rehearsal | str]"]
 """Has something worked out, here or elsewhere."""
@@ -42,19 +39,14 @@ def rehearsed(
     """
     from interfaces.val2.errors import ValError
     from interfaces.val2.playing import rehearse
-    from interfaces.val2.source import parse_file
+    from interfaces.val2.source import joined, parse_file
     from robots import puma560
 
     text = source or (programs or {}).get(program, "")
     if not text:
         return f"there's no program {program} here: give its file as well"
     try:
-        file = parse_file(text, program)
-        first = [one for one in file.programs if one.name.lower() == program.lower()]
-        if not first:
-            return f"its file holds no program {program}"
-        others = [one for one in file.programs if one is not first[0]]
-        found = rehearse(replace(file, programs=(*first, *others)), puma560.model(), limit=LONGEST, start=start)
+        found = rehearse(joined([parse_file(text, program)], program), puma560.model(), start=start)
     except ValError as error:
         return f"{program}: {error}"
     return f"{program}: {found.findings[0].error}" if found.findings else found

@@ -21,6 +21,7 @@ from interfaces.val2.memory import KINDS
 from interfaces.val2.monitor import layout, locations, running, storage
 from interfaces.val2.monitor.editor import edit
 from interfaces.val2.monitor.state import Dialogue, TerminalState, begun, nothing, split_word
+from interfaces.val2.printer import number
 from interfaces.val2.rows import Form, Setting
 from vrs.checks import did_you_mean
 
@@ -176,7 +177,7 @@ def explained(word: str) -> Iterator[Word]:
         yield Word(upper, switch.help, "switch", f"ENABLE {upper} | DISABLE {upper}", switch.origin)
     if upper in forms.PARAMETERS:
         row = forms.PARAMETERS[upper]
-        said = f"{row.help} {layout.number(row.low)} to {layout.number(row.high)} {row.unit}."
+        said = f"{row.help} {number(row.low)} to {number(row.high)} {row.unit}."
         yield Word(upper, said, "parameter", f"PARAMETER {upper} = value", row.origin)
     for kind, words in (("operator", forms.OPERATORS), ("word", forms.WORDS)):
         if upper in words:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from interfaces.val2.motion.places import Where
+from interfaces.val2.printer import number
 from interfaces.val2.values import VAL2, Dialect, Location, Transformation, Value
 
 WIDTH = 79
@@ -20,13 +21,6 @@ def fixed(value: float, decimals: int) -> str:
     """A number with so many decimals, without a minus before zero."""
     shown = f"{value:.{decimals}f}"
     return shown.removeprefix("-") if float(shown) == 0.0 else shown
-
-
-def number(value: float) -> str:
-    """A number as short as it can be while it's still the same."""
-    if value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    return f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
 
 
 def heading(dialect: Dialect = VAL2) -> str:

@@ -13,6 +13,7 @@ from interfaces.val2.context import MOST_PERCENT
 from interfaces.val2.errors import ValError
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, integer, named, pieces, unique
+from interfaces.val2.printer import number as spelled
 from interfaces.val2.rows import numbered
 from interfaces.val2.signals import INPUTS, INTERNAL, OUTPUTS, legal
 from interfaces.val2.syntax import BLANK, Expression, Instruction, Step
@@ -164,7 +165,7 @@ def status(state: TerminalState, _rest: str) -> None:
     state.say(
         *layout.table([
             ("Program", doing),
-            ("Monitor speed", f"{layout.number(arm.monitor_speed())} %"),
+            ("Monitor speed", f"{spelled(arm.monitor_speed())} %"),
             ("Power", "on" if controller.switches[POWER] else "off"),
             ("Arm", "stands" if all(abs(a - b) < 1e-6 for a, b in zip(here, there, strict=True)) else "moves"),
             ("Session time", f"{layout.fixed(state.now, 3)} s"),
@@ -207,7 +208,7 @@ def parameter(state: TerminalState, rest: str) -> None:
     given, value = halves(rest)
     names = _matched(given, parameters, "parameter") or sorted(parameters)
     if value is None:
-        state.say(*layout.table([(name, f"= {layout.number(parameters[name])}") for name in names]))
+        state.say(*layout.table([(name, f"= {spelled(parameters[name])}") for name in names]))
         return
     if not given or len(names) != 1:
         raise ValError("Invalid argument", "PARAMETER name = value")
@@ -218,12 +219,12 @@ def speed(state: TerminalState, rest: str) -> None:
     """SPEED; SPEED percent: the monitor speed."""
     arm = state.controller.arm
     if rest in {"", "?"}:
-        state.say(f"Monitor speed {layout.number(arm.monitor_speed())} %")
+        state.say(f"Monitor speed {spelled(arm.monitor_speed())} %")
         return
     wanted = state.number(rest)
     arm.set_monitor_speed(wanted, now=state.now)
     if wanted > MOST_PERCENT:
-        state.say(f"*Warning* SPEED {layout.number(wanted)} % counts as {MOST_PERCENT:g} %", style=Style.NOTE)
+        state.say(f"*Warning* SPEED {spelled(wanted)} % counts as {MOST_PERCENT:g} %", style=Style.NOTE)
 
 
 def signal(state: TerminalState, rest: str) -> None:
@@ -253,7 +254,7 @@ def channel(state: TerminalState, rest: str, *, word: str) -> None:
         known[numbered("channel", state.number(given))] = state.number(value)
         return
     shown = [numbered("channel", state.number(given))] if given else [n for n in known if known[n]] or [*known][:1]
-    state.say(*layout.table([(f"{word} {n}", f"= {layout.number(known[n])}") for n in shown]))
+    state.say(*layout.table([(f"{word} {n}", f"= {spelled(known[n])}") for n in shown]))
 
 
 def calibrate(state: TerminalState, _rest: str) -> Dialogue:
@@ -269,11 +270,11 @@ def show_setting(state: TerminalState, word: str) -> bool:
     controller = state.controller
     if word in {"COARSE", "FINE"}:
         fine, percent = controller.arm.tolerance()
-        state.say(f"{'FINE' if fine else 'COARSE'} {layout.number(percent)} %")
+        state.say(f"{'FINE' if fine else 'COARSE'} {spelled(percent)} %")
     elif word in controller.switches:
         state.say(f"{word} is {'ON' if controller.switches[word] else 'OFF'}")
     elif word in controller.parameters:
-        state.say(f"{word} = {layout.number(controller.parameters[word])}")
+        state.say(f"{word} = {spelled(controller.parameters[word])}")
     else:
         return False
     return True

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -14,9 +13,10 @@ from interfaces.val2.memory import KINDS, MOST_VALUES, Memory
 from interfaces.val2.monitor import layout
 from interfaces.val2.monitor.state import Dialogue, Style, TerminalState, halves, named, nothing, pieces
 from interfaces.val2.parser import parse_expression
-from interfaces.val2.printer import print_expression, print_program
+from interfaces.val2.printer import number, print_expression, print_program
 from interfaces.val2.source import NamedValue, SourceFile, print_file, read_file, with_called
 from interfaces.val2.syntax import Program, Variable
+from interfaces.val2.syntax import parts as parts_of
 from interfaces.val2.values import Value
 
 T = TypeVar("T")
@@ -43,7 +43,7 @@ def list_values(state: TerminalState, rest: str, *, kind: str) -> None:
     known = {name: entry.value for name, entry in entries}
     computed = not all(_PATTERN.fullmatch(piece) for piece in pieces(rest))
     if kind == "reals" and (computed or _product(rest, known)):
-        state.say(layout.number(state.number(rest)))
+        state.say(number(state.number(rest)))
     elif kind == "strings" and computed:
         value = state.value(rest)
         if not isinstance(value, str):
@@ -210,7 +210,14 @@ def _source(state: TerminalState, name: str, parts: str, names: str) -> SourceFi
         programs = dict(memory.programs)
         if names:
             programs = with_called(programs, chosen(programs, names, _WORDS["programs"]))
-            used = {variable.name for variable in _variables(tuple(programs.values()))}
+            statements = (step.statement for program in programs.values() for step in program.steps)
+            used = {
+                part.name
+                for statement in statements
+                for expression in statement.expressions
+                for part in parts_of(expression)
+                if isinstance(part, Variable)
+            }
     entries: dict[str, NamedValue] = {}
     for kind in KINDS if not parts else KINDS.keys() & {parts}:
         known = _entries(memory, kind)
@@ -224,18 +231,6 @@ def _entries(memory: Memory, kind: str) -> dict[str, NamedValue]:
     """Variables of a kind, by how they're written."""
     entries = (NamedValue(*one) for one in memory.variables())
     return {print_expression(e.variable): e for e in entries if isinstance(e.value, KINDS[kind])}
-
-
-def _variables(node: object) -> Iterator[Variable]:
-    """The variables of a tree."""
-    if isinstance(node, Variable):
-        yield node
-    if isinstance(node, tuple):
-        for part in node:
-            yield from _variables(part)
-    elif dataclasses.is_dataclass(node):
-        for field in dataclasses.fields(node):
-            yield from _variables(getattr(node, field.name))
 
 
 def delete(state: TerminalState, rest: str, *, kind: str) -> Dialogue:

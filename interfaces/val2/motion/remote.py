@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Final
 
@@ -56,7 +57,7 @@ class RemoteRobot(RobotPort):
         if not self._viewer.wait(lambda viewer: viewer.timeline is not None, _FETCHED):
             self._viewer.close()
             raise InvalidValueError("timeline", None, f"sent by the server within {_FETCHED:g} s")
-        self._timeline = self._newest()
+        self._timeline = self.timeline
 
     @property
     @override
@@ -66,9 +67,6 @@ class RemoteRobot(RobotPort):
     @property
     @override
     def timeline(self) -> Timeline:
-        return self._newest()
-
-    def _newest(self) -> Timeline:
         timeline = self._viewer.timeline
         # While it's fetched anew there's none.
         if timeline is not None:
@@ -99,7 +97,8 @@ class RemoteRobot(RobotPort):
             return issued
         command, before = self._asked[number]
         if not (self._shows(command, issued.receipt, before) or self.other.halted):
-            if now < self._patience(issued) + _PATIENCE:
+            end = None if issued.receipt is None else issued.receipt.end
+            if now < max(issued.answered_at, end or -math.inf) + _PATIENCE:
                 return None
             if isinstance(command, MotionCommand) and not self._leads_to(issued.receipt):
                 issued = replace(
@@ -107,13 +106,6 @@ class RemoteRobot(RobotPort):
                 )
         del self._asked[number]
         return issued
-
-    @staticmethod
-    def _patience(issued: Issued) -> float:
-        """From when on an answer waits no longer than that for its edit [s]."""
-        end = None if issued.receipt is None else issued.receipt.end
-        assert issued.answered_at is not None
-        return issued.answered_at if end is None else max(issued.answered_at, end)
 
     def _shows(self, command: Command | None, receipt: Receipt | None, before: Timeline) -> bool:
         timeline = self.timeline

@@ -70,7 +70,7 @@ def test_a_live_robot_doesnt_wait_while_a_program_is_worked_out() -> None:
     ("program", "source", "says"),
     [
         ("wave", "", "give its file"),
-        ("dance", WAVE, "no program dance"),
+        ("dance", WAVE, "Undefined program name* dance; allowed: other, wave"),
         ("wave", ".PROGRAM wave()\n    DRIVE 1\n.END\n", "wave"),
         ("wave", ".PROGRAM wave()\n    WAIT SIG(1001)\n.END\n", "Waits for ever"),
         ("wave", ".PROGRAM wave()\n    MOVE TRANS(5000,0,0,0,0,0)\n.END\n", "out of range"),
