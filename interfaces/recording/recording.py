@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,6 +66,12 @@ def open_recording(path: Path | str, robot: Robot | None = None) -> Recording:
         FormatError: If it's none, or if what it begins with is destroyed.
     """
     return Recording(Path(path), robot)
+
+
+_LOOKED_AT: Final = 16
+"""Blocks that are read to see whether a description is the one that was recorded."""
+_SAME_PLACE: Final = 1e-5
+"""Largest distance of a recorded pose from the computed one [m]: it's written to 1e-9, its time to a nanosecond."""
 
 
 class Recording:
@@ -173,7 +179,31 @@ class Recording:
         numbers = POSTURE if begin.drive is not None else robot.arm.limits.dof
         if len(begin.q) != numbers:
             raise FormatError(str(self.path), f"of a {name!r} with {len(begin.q)} numbers to say where it is")
+        if begin.drive is None and described(begin.found_by):
+            self._check_description(robot)
         return robot
+
+    def _check_description(self, robot: Robot) -> None:
+        """See that an arm's last link is where the recording has it; else each figure of its tool would be another.
+
+        Raises:
+            FormatError: If it isn't: the description has changed since, or it's another one of the same name.
+        """
+        held = list(self._blocks.having(NUMBERS["/virtual/pose"]))
+        log = self.logs["/virtual/pose"]
+        shown = [entry for index in held[:: len(held) // _LOOKED_AT + 1] for entry in log.of(index)]
+        q = self.virtual([entry.timestamp.sec + 1e-9 * entry.timestamp.nsec for entry in shown])
+        known = np.isfinite(q).all(axis=-1)
+        if not known.any():
+            return
+        places = (entry.pose.position for entry in shown)
+        p = np.array([[place.x, place.y, place.z] for place in places])
+        off = np.linalg.norm(self.kind.poses(robot.arm, q[known])[:, :3, 3] - p[known], axis=1)
+        # A single one may have been shown before a command of the same instant counted.
+        if (off > _SAME_PLACE).mean() > 0.1:
+            text = f"its tool is up to {1e3 * off.max():.3g} mm from where the recording has it"
+            said = f"of another {robot.name!r} than is there now: {text}; --robot says where the old one is"
+            raise FormatError(str(self.path), said)
 
     def _found(self, name: str, found_by: str) -> Robot | None:
         """The robot of a file or of numbers, or of a name; None where nothing here has it.

@@ -149,6 +149,11 @@ def test_a_recording_says_when_its_file_is_gone_and_takes_another(
     assert f"{path}: there's no such file; --robot says where it is" in error
     there = moved / "robots" / path.name
     assert "identical" in vrs("replay", out / "run.mcap", "--commands", "--robot", there, "--tip", "lamp")
+    capsys.readouterr()
+    text = there.read_text(encoding="utf-8")
+    there.write_text(text.replace('<origin xyz="1 0 0"/>', '<origin xyz="1.02 0 0"/>'), encoding="utf-8")
+    vrs("compare", out / "run.mcap", "--robot", there, "--tip", "lamp", status=2)
+    assert "its tool is up to 20 mm from where the recording has it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("body", ["bullet", "mujoco"])
