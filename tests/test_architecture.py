@@ -35,7 +35,8 @@ ORDER = (
     "interfaces.stream", "interfaces.rsp", "interfaces.recording", "interfaces.media", "interfaces.runtime",
     "interfaces.connecting", "interfaces",
     # The language and the page, then the laboratory, which nothing that runs live needs.
-    "interfaces.val2", "interfaces.station", "interfaces.relay", "interfaces.lab", "interfaces.report", "interfaces.cli",
+    "interfaces.val2", "interfaces.station", "interfaces.relay", "interfaces.lab", "interfaces.report",
+    "interfaces.cli",
 )
 # fmt: on
 """The rooms, folders and files, in their order: each imports only itself and what stands before it."""

@@ -43,7 +43,6 @@ def test_a_page_shows_what_a_viewer_may_see_and_goes_to_another_relay_when_its_o
             page.wait("station.session.lease.holder === 'client'")
             page.wait("document.getElementById('save').ariaDisabled === 'true'")
             page.shoot("relay")
-            assert not page.errors
 
             page.breaks = True
             killed = time.monotonic()
@@ -88,4 +87,3 @@ def test_a_mobile_robot_is_relayed(tmp_path, browser):
         with paged(browser, relay.url) as page:
             page.open()
             page.shoot("relay-mobile")
-            assert not page.errors
