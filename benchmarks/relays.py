@@ -1,4 +1,4 @@
-"""1,000 viewers of relays: do all edits reach them in time, what does a second relay cost the hub, what if one is killed?
+"""1,000 viewers of relays: do all edits come in time, what does a second relay cost the hub, what if one is killed?
 
 Router, hub with its robot, relays and viewers (`watchers.py`) are processes of their own, all on loopback, all of
 this machine's cores. An edit's age counts from when its command is sent to the hub. `python -m benchmarks relays`.
@@ -249,8 +249,8 @@ def linked() -> None:
         facts = health(at)
         print(
             f"mon with 2 % loss between routers: a viewer has all {len(own.timeline or ())} segments, bit by bit; "
-            f"of {LINKED} viewers' edits by themselves {ages_of(viewers.ask(sent))} (what is fetched as a whole isn't "
-            f"counted); gaps found and filled: {facts.get('gaps')}, silent for over 5 s: {facts['hubs'] - 1} times"
+            f"of {LINKED} viewers' edits by themselves {ages_of(viewers.ask(sent))} (fetched as a whole they "
+            f"don't count); gaps found and filled: {facts.get('gaps')}, silent for 5 s: {facts['hubs'] - 1} times"
         )
 
 

@@ -207,6 +207,8 @@ export class Jogging {
 
   /** Ask the server for the saved poses, perhaps after a change: {name, q}, or {name} to delete one; why not, "" where it's done. */
   async poses(change) {
+    // A relay keeps none: poses are for who commands.
+    if (this.session.relays) return "";
     const given = change && { method: "POST", body: JSON.stringify(change) };
     const { poses, problem = "" } = await this.session.ask("/poses", given);
     if (poses && JSON.stringify(poses) !== JSON.stringify(this.saved)) this.saved = poses;
