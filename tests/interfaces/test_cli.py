@@ -262,6 +262,18 @@ def test_output_that_finds_no_room_is_one_line(tmp_path):
     assert (done.returncode, done.stderr) == (1, "vrs: standard output: No space left on device\n")
 
 
+def test_a_console_whose_output_nobody_reads_ends_without_a_traceback():
+    command = [sys.executable, "-c", "from interfaces.cli import main; main()", "console", "--alone"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        process.stdout.close()
+        process.stdin.write(b"where\n")
+        process.stdin.flush()
+        said = process.stderr.read()
+        assert (process.wait(30), said) == (1, b"")
+
+
 def test_a_terminal_that_knows_no_unicode_gets_what_it_knows():
     asked = [sys.executable, "-c", "from interfaces.cli.main import _ready_streams as r; r(); print('−8 … 8')"]
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import sys
 import threading
@@ -219,6 +220,8 @@ class Pipe:
         self._terminal = LineTerminal(sys.stdout.write, monitor, Input(telnet=False), piped=True)
         self._room = threading.Event()
         self._done = asyncio.Event()
+        self._unheard: BrokenPipeError | None = None
+        """Set once nobody reads standard output any more."""
         self._turning = Turning(clock, self._turn)
 
     async def run(self) -> None:
@@ -231,6 +234,8 @@ class Pipe:
             await self._done.wait()
         finally:
             self._turning.stop()
+        if self._unheard is not None:
+            raise self._unheard
 
     def interrupt(self) -> None:
         """Ctrl-C: once for what is under way; when nothing is, for the end."""
@@ -255,8 +260,13 @@ class Pipe:
         self._turning.soon()
 
     def _turn(self, now: float) -> float:
-        self._terminal.advance(now=now)
-        sys.stdout.flush()
+        try:
+            self._terminal.advance(now=now)
+            sys.stdout.flush()
+        except BrokenPipeError as error:
+            self._unheard = error
+            self._done.set()
+            return math.inf
         if len(self._terminal.lines) <= _MOST:
             self._room.set()
         if self._monitor.done:
