@@ -66,7 +66,8 @@ class Publisher(OperatorDevice):
         self._lease, self._news = -1, 0
         self._place: ReaderPosition | None = None
         self._shown = 0
-        self._turning = Turning(clock, self._turn, longest=LOOK)
+        self.turning = Turning(clock, self._turn, longest=LOOK)
+        """Publishes what is new."""
         self._watched: Callable[[], bool] = lambda: False
         self.published = 0
         """Values that were published."""
@@ -78,7 +79,7 @@ class Publisher(OperatorDevice):
         try:
             yield self
         finally:
-            self._turning.stop()
+            self.turning.stop()
             opening.cancel()
             await asyncio.gather(opening, return_exceptions=True)
             self._leave_scene()
@@ -98,11 +99,11 @@ class Publisher(OperatorDevice):
         network.answer(f"{key}/view/scene", instance, lambda *_: (self._scene_since(0),))
         self._watched = network.is_heard(f"{key}/view/scene")
         network.announce(f"{key}/hub/{instance}")
-        self._turning.start()
+        self.turning.start()
 
     @override
     def turn(self) -> None:
-        self._turning.soon()
+        self.turning.soon()
 
     @override
     def health(self) -> dict[str, Any]:

@@ -109,8 +109,9 @@ class Relay:
         self.config, self._network, self._access, self._clock = config, network, access, clock
         self._audit, self._say = audit, say
         self._who = secrets.token_hex(8)
-        self._nodes = Nodes(MOST_VIEWERS)
-        self._view = view_routes(self._nodes, authorize=partial(admit, access, Role.VIEWER))
+        self.nodes = Nodes(MOST_VIEWERS)
+        """The scene."""
+        self._view = view_routes(self.nodes, authorize=partial(admit, access, Role.VIEWER))
         self._waiting = Router([
             Route("/health", self._say_unheard), WebSocketRoute("/ws", Endpoint(self._refuse)), station_files(),
             *self._view, Route("/", self._say_waiting),
@@ -122,7 +123,8 @@ class Relay:
         self._others: dict[str, None] = {}
         """Addresses of the other relays' pages."""
         self._life: asyncio.Task[None] | None = None
-        self._hub: Hub | None = None
+        self.hub: Hub | None = None
+        """What is served to viewers; None without a hub elsewhere."""
         self.mirror: Mirror | None = None
         """What is known of the hub; None without one."""
         self._stopping = False
@@ -187,8 +189,8 @@ class Relay:
         # Whoever is cut off from the network hasn't seen the others go.
         if there or not self._network.connected:
             self._others[page] = None
-        if self._hub is not None:
-            self._hub.tell(self._relays)
+        if self.hub is not None:
+            self.hub.tell(self._relays)
 
     @property
     def _relays(self) -> Relays:
@@ -226,7 +228,7 @@ class Relay:
                     while (heard := await came.get())[0] != "facts":
                         pass
                     facts = heard[1]
-        mirror = self.mirror = Mirror(facts, self._clock, self._nodes)
+        mirror = self.mirror = Mirror(facts, self._clock, self.nodes)
         server: HubServer | None = None
 
         def take(kind: str, data: bytes, at: float) -> None:
@@ -240,8 +242,8 @@ class Relay:
                 network.ask(
                     f"{key}/{'view/scene' if kind == 'scene' else kind}", payload, instance, self._who, take
                 )
-            if self._hub is not None and server is not None:
-                self._pass_on(mirror, self._hub)
+            if self.hub is not None and server is not None:
+                self._pass_on(mirror, self.hub)
                 server.kick()
 
         async with contextlib.AsyncExitStack() as stack:
@@ -251,7 +253,7 @@ class Relay:
             looked = False
             while self._clock.now() < mirror.heard + SILENCE:
                 # Only what somebody looks at is drawn, and sent.
-                if looked is (self._nodes.readers == 0):
+                if looked is (self.nodes.readers == 0):
                     looked = not looked
                     looking.close()
                     if looked:
@@ -259,7 +261,7 @@ class Relay:
                         mirror.look()
                 turn()
                 if server is None and mirror.site is not None:
-                    hub = self._hub = self._made(mirror)
+                    hub = self.hub = self._made(mirror)
                     server = HubServer(hub, mirror.clock, health=self._health)
                     await stack.enter_async_context(server.running())
                     stack.callback(self._end, hub)
@@ -306,7 +308,7 @@ class Relay:
             session.close(RESTART, ProblemCode.UNHEARD if gone else ProblemCode.STOPPING, text)
 
     def _forget(self) -> None:
-        self._hub = self.mirror = None
+        self.hub = self.mirror = None
 
     def _health(self) -> dict[str, Any]:
         mirror = self.mirror

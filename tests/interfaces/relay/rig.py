@@ -123,7 +123,7 @@ def relayed(at: str, tokens: dict[Role, str] | None = None, *, ready: bool = Tru
     """A relay, which serves."""
     with beside(_relayed(at, tokens)) as serving:
         if ready:
-            until(lambda: serving.relay._hub is not None)
+            until(lambda: serving.relay.hub is not None)
         yield serving
 
 
