@@ -111,21 +111,21 @@ def swept(
         as_json: Whether the summary goes to standard output, too.
     """
     import json
-    from time import perf_counter
 
     from interfaces.lab.driving.design import planned, write_table
     from interfaces.lab.driving.output import summary
     from interfaces.lab.driving.sweep import measure
     from interfaces.lab.output import write_files
     from interfaces.report.surface import PAGE, write_sweep
+    from vrs.clock import WallClock
 
     calls = [(measure, (case,)) for case in chosen]
     prepare(out, "runs.parquet", "runs.csv", "summary.json", PAGE)
     with sweep as (who, finished):
-        kept, begun = finished.ready(calls), perf_counter()
+        kept, clock = finished.ready(calls), WallClock()
         if kept < len(calls):
             measure(chosen[0])
-        each = perf_counter() - begun
+        each = clock.now()
         for line in planned(settings, len(calls), kept, each, who if isinstance(who, int) else None):
             typer.echo(line, err=True)
         if only_plan:

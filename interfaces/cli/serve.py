@@ -626,7 +626,7 @@ def _operator(serving: _Serving, access: Access, clock: Clock, log: AuditLog | N
         recording=None if record is None else serving.recording(record),
         room=serving.room, jobs=JobFile(serving.jobs), arm=lasts,
         camera=CameraConfig(serving.camera, robot=serving.robot.found_by) if serving.camera else None,
-        datagrams=serving.datagrams, blocked=lambda said: typer.echo(f"vrs: {said}", err=True),
+        datagrams=serving.datagrams, say=lambda said: typer.echo(f"vrs: {said}", err=True),
         in_order=serving.in_order,
     )  # fmt: skip
     return LiveOperator(config, access, clock=clock, audit=log)

@@ -15,7 +15,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from ssl import SSLContext
 from typing import Any
@@ -111,15 +111,16 @@ async def operator_here(
     delay: str = "none",
     certificate: Certificate | None = None,
     token: str | None = None,
-    blocked: Callable[[str], None] | None = None,
+    say: Callable[[str], None] = lambda _: None,
+    datagrams: bool = False,
 ) -> AsyncIterator[tuple[LiveOperator, str]]:
-    """An operator's site in this loop, and its URL for programs; it wants datagrams where `blocked` is given."""
+    """An operator's site in this loop, and its URL for programs."""
     listening = sockets.bind("127.0.0.1", 0)
     port = listening.getsockname()[1]
     link = LinkConditions.symmetric(Conditions(delay=delay_profile(delay)))
-    config = LiveOperatorConfig(ROBOT, url, link, q=NOMINAL, robot_certificate=certificate, robot_token=token)
-    if blocked is not None:
-        config = replace(config, datagrams=True, blocked=blocked)
+    config = LiveOperatorConfig(
+        ROBOT, url, link, q=NOMINAL, robot_certificate=certificate, robot_token=token, say=say, datagrams=datagrams
+    )
     operator = LiveOperator(config, Access(free=OPEN))
     app = application(operator.routes, hosts(["127.0.0.1"], port))
     async with sockets.serve(app, listening), operator.running():

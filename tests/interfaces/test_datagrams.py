@@ -426,7 +426,8 @@ def test_both_sites_live_by_tls_and_what_is_said(shown: tuple[Certificate, Certi
                 receive(message, now=now)
 
             robot.host.receive = heard  # type: ignore[method-assign]
-            async with live_rig.operator_here(at, certificate=operators, blocked=said.append) as (operator, _):
+            here = live_rig.operator_here(at, certificate=operators, say=said.append, datagrams=True)
+            async with here as (operator, _):
                 client = operator.robot
                 wanted = DatagramState.THROUGH if not beside else DatagramState.BLOCKED
                 await live_rig.until(lambda: client.datagrams is wanted and operator.operator.report is not None)

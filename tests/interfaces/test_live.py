@@ -12,8 +12,9 @@ import pytest
 
 from interfaces import connect
 from interfaces.link import Conditions, LinkConditions, delay_profile
-from interfaces.messages.control import Lease
+from interfaces.messages.control import Lease, Role
 from interfaces.runtime.laboratory import Laboratory
+from interfaces.stream.access import Access, make_token
 from interfaces.stream.connection import Connection
 from interfaces.teleop import FollowingArm, OperatorSite, RobotSiteConfig, VirtualArm
 from robots import puma560
@@ -28,6 +29,7 @@ from tests.interfaces.live_rig import (
     lose_operator,
     operator_here,
     robot_here,
+    until,
 )
 from vrs import Insertion, JointTarget, MotionCommand, SteerCommand
 from vrs.commands import Command
@@ -233,3 +235,24 @@ def test_hardware_behind_a_driver_follows_and_is_stopped_where_a_servo_is_stuck(
             robot.wait(lambda r: r.state is not None and r.state.play >= end + 0.5, 20.0)
             assert not robot.state.halted
             assert np.abs(robot.state.q - start - 0.25).max() < 0.02
+
+
+def test_why_a_robot_cant_be_connected_to_is_said_once_for_each_reason() -> None:
+    said: list[str] = []
+
+    async def main() -> str:
+        access = Access({Role.SITE: make_token()}, free=())
+        async with robot_here(access=access) as (_, url):
+            async with operator_here(url, say=said.append) as (operator, _):
+                await until(lambda: said)
+                await asyncio.sleep(1.5)
+                operator.robot.url = url.replace(url.split(":")[2].partition("/")[0], "1")
+                await until(lambda: len(said) > 1)
+                await asyncio.sleep(1.0)
+            return url
+
+    url = asyncio.run(main())
+    assert said[0].startswith(f"no robot at {url}: ")
+    assert "token" in said[0]
+    assert [line.count("it's tried again") for line in said] == [1, 1]
+    assert "127.0.0.1:1/site" in said[1]

@@ -93,8 +93,8 @@ class LiveOperatorConfig:
     """Its camera; None for none, nor voice and screen."""
     datagrams: bool = False
     """Whether messages are also sent as datagrams, where the robot takes them."""
-    blocked: Callable[[str], None] = lambda _: None
-    """Is told once, for people, that no datagram gets through."""
+    say: Callable[[str], None] = lambda _: None
+    """Is told, for people, why there's no connection to the robot, and once that no datagram gets through."""
     arm: Callable[[ArmJob], float | str | None] = lambda _: None
     """Says of a program of the list how long it takes [s], why it'd fail, or None where nobody knows."""
     in_order: bool = False
@@ -142,7 +142,7 @@ class LiveOperator(LeasedRobot, Workers):
         self.robot = RobotClient(
             self.line, config.robot, self.clock, self._turning.soon, name=which.name, room=twins.room,
             token=config.robot_token, certificate=config.robot_certificate, reports=twins.reports,
-            link_loss=config.link_loss, datagrams=config.datagrams, blocked=config.blocked,
+            link_loss=config.link_loss, datagrams=config.datagrams, say=config.say,
         )  # fmt: skip
         # Every lease of an earlier life has a smaller epoch.
         lease = Lease(epoch=int(seconds_since_1970()) << 32)

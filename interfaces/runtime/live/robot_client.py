@@ -77,7 +77,7 @@ class RobotClient:
         reports: type = Report,
         link_loss: LossPolicy | None = None,
         datagrams: bool = False,
-        blocked: Callable[[str], None] = lambda _: None,
+        say: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Say where the robot is; `run` connects.
 
@@ -93,14 +93,16 @@ class RobotClient:
             reports: What its robots send.
             link_loss: What the robot is to do when the link is lost; None leaves it to the robot.
             datagrams: Whether messages are also sent as datagrams, where the robot takes them.
-            blocked: Is told once, for people, that none gets through.
+            say: Is told, for people, why it can't connect, whenever that's another reason, and once that no
+                datagram gets through.
         """
         self._coming: Any = reports | Ping | Problem
         self._name, self._room, self._link_loss = name, room, link_loss
         self._line, self.url, self._clock, self._changed, self._token = line, url, clock, changed, token
         self._certificate = certificate
         self._session = secrets.token_urlsafe(12)
-        self._wants_datagrams, self._blocked = datagrams, blocked
+        self._wants_datagrams, self._say = datagrams, say
+        self._said = ""
         self._told = False
         self._datagrams: tuple[OperatorDatagrams, DatagramSocket] | None = None
         self._waiting: deque[bytes] = deque(maxlen=_WAITING)
@@ -177,6 +179,9 @@ class RobotClient:
                 RobotUnfitError,
             ) as error:
                 self.problem = explained(error, tls=self.url.startswith("wss"))
+                if self.problem != self._said and not self.lost:
+                    self._said = self.problem
+                    self._say(f"no robot at {self.url.partition('#')[0]}: {self.problem}; it's tried again")
             except Exception as error:  # noqa: BLE001 - whatever it is, it ends no more than this connection
                 _LOG.exception("the connection to the robot failed")
                 self.problem = f"this site failed at a message of the robot's: {type(error).__name__}"
@@ -208,6 +213,7 @@ class RobotClient:
             if unfit := self._unfit(answer):
                 raise RobotUnfitError(unfit)
             self.attached, self.problem = msgspec.structs.replace(answer, datagrams=""), ""
+            self._said = ""
             self.connections += 1
             self._waiting.clear()
             self._line.connected = True
@@ -255,7 +261,7 @@ class RobotClient:
             self._take(data)
             if self.datagrams is DatagramState.BLOCKED and not self._told:
                 self._told = True
-                self._blocked(f"{BLOCKED} {self.url.partition('#')[0]}")
+                self._say(f"{BLOCKED} {self.url.partition('#')[0]}")
 
     def _take(self, data: bytes) -> None:
         message = decode(data, Encoding.MSGPACK, allowed=self._coming, largest=LARGEST)
