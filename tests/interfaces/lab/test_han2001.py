@@ -228,7 +228,6 @@ def test_a_rivals_figures_are_beside_a_superiority() -> None:
     assert {claim.verdict for claim in unshown} == {Verdict.NOT_SHOWN}
 
 
-@pytest.mark.needs("pybullet")
 def test_the_micro_robot_drives_to_scale() -> None:
     who, small = (operator("figure-eight", 0, 0.1) for _ in range(2))
     miniature = architectures.MiniatureOperator(small)

@@ -71,7 +71,6 @@ def told() -> Told:
     return Told(ROOM, 26.0)
 
 
-@pytest.mark.needs("pybullet")
 def test_whoever_comes_is_told_it_once_and_whoever_comes_back_again(told: Told) -> None:
     (first, distance, bearing), (second, *_) = told.came
     # 0.6 m from the robot's outline, whose front is some 0.09 m before its middle; and half a second to be sure.
@@ -83,7 +82,6 @@ def test_whoever_comes_is_told_it_once_and_whoever_comes_back_again(told: Told) 
     assert told.played == 2 * len(STORY) * 2
 
 
-@pytest.mark.needs("pybullet")
 def test_its_camera_takes_a_picture_of_who_came_and_its_lip_moves_while_it_tells(told: Told) -> None:
     assert len(told.teller.pictures) == 2
     for data in told.teller.pictures:
@@ -100,7 +98,6 @@ def test_its_camera_takes_a_picture_of_who_came_and_its_lip_moves_while_it_tells
     assert min(moving) < 50.0
 
 
-@pytest.mark.needs("pybullet")
 def test_its_microphone_hears_the_room_and_its_own_story(told: Told) -> None:
     def share(piece: np.ndarray, pitch: float) -> float:
         """How much of a piece is a tone [samples, root mean square]."""
@@ -119,7 +116,6 @@ def test_its_microphone_hears_the_room_and_its_own_story(told: Told) -> None:
     assert share(loud, 300.0) == pytest.approx(0.25 * 12_000 / 2 / math.sqrt(2), rel=0.15)
 
 
-@pytest.mark.needs("pybullet")
 def test_where_packets_are_lost_nobody_is_told_it_twice_and_the_microphone_keeps_its_time() -> None:
     lossy = Told(ROOM, 12.0, loss=0.15)
     assert [round(t) for t, *_ in lossy.came] == [9]
@@ -157,7 +153,6 @@ def test_a_story_of_any_rate_lasts_as_long_on_the_speaker() -> None:
     assert np.abs(np.fft.rfft(played)).argmax() == 100
 
 
-@pytest.mark.needs("pybullet")
 @pytest.mark.parametrize("speaks", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_command_tells_it_and_says_so_where_nothing_speaks(
     tmp_path: Path, speaks: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
