@@ -236,8 +236,9 @@ def server_url(text: str, path: str = "/ws") -> str:
     """The WebSocket's address of a server: `wss://` off loopback, and where a certificate is told, else `ws://`.
 
     Args:
-        text: `HOST:PORT`, or an address by http, https, ws or wss; what its certificate is known by after a `#`.
-        path: Where the address has none.
+        text: `HOST:PORT`, or an address by http, https, ws or wss, that of a page with `/` in the end included; what
+            its certificate is known by after a `#`.
+        path: Where the address has none, or below that page.
     """
     base, hashed, known = text.partition("#")
     scheme, separator, rest = base.partition("://")
@@ -245,7 +246,9 @@ def server_url(text: str, path: str = "/ws") -> str:
         rest = base
         scheme = "wss" if hashed or not is_loopback(urlsplit(f"//{base}").hostname or "") else "ws"
     scheme = {"http": "ws", "https": "wss"}.get(scheme, scheme)
-    return f"{scheme}://{rest}{'' if '/' in rest else path}{hashed}{known}"
+    if "/" not in rest or rest.endswith("/"):
+        rest = rest.rstrip("/") + path
+    return f"{scheme}://{rest}{hashed}{known}"
 
 
 @functools.lru_cache(16)

@@ -236,6 +236,8 @@ def test_t01_nothing_goes_off_this_machine_in_plain() -> None:
         server_url("https://arm.example/robots/ipr/ws#ca=/a/b.pem") == "wss://arm.example/robots/ipr/ws#ca=/a/b.pem"
     )
     assert server_url("localhost:1#sha256=00", "/site") == "wss://localhost:1/site#sha256=00"
+    assert server_url("http://127.0.0.1:8600/") == "ws://127.0.0.1:8600/ws"
+    assert server_url("https://arm.example/robots/ipr/#ca=a.pem") == "wss://arm.example/robots/ipr/ws#ca=a.pem"
     for url in ("ws://192.0.2.1:8600", "http://arm.example:8600", "ws://[2001:db8::1]:8600/ws"):
         with pytest.raises(InvalidValueError, match="wss://"):
             connect(url, token="a" * 43)
