@@ -236,8 +236,8 @@ def server_url(text: str, path: str = "/ws") -> str:
     """The WebSocket's address of a server: `wss://` off loopback, and where a certificate is told, else `ws://`.
 
     Args:
-        text: `HOST:PORT`, or an address by http, https, ws or wss, that of a page with `/` in the end included; what
-            its certificate is known by after a `#`.
+        text: `HOST:PORT`, or an address by http, https, ws or wss, that of a page with `/` in the end included;
+            what its certificate is known by after a `#`.
         path: Where the address has none, or below that page.
     """
     base, hashed, known = text.partition("#")
