@@ -193,12 +193,18 @@ def _starts(timeline: AnyTimeline, low: int, high: int) -> Array:
     return np.array([timeline.start_of(index) for index in range(low, high)])
 
 
+def clock_text(t: float) -> str:
+    """A time [s] as pages write it, such as 1:05.25."""
+    hundredths = round(abs(t) * 100)
+    return f"{'−' if t < 0 else ''}{hundredths // 6000}:{hundredths % 6000 / 100:05.2f}"
+
+
 def _changed(before: RecordedEdit, edit: RecordedEdit) -> Iterator[Mark]:
     """The mark of an edit, where it changed what had been planned."""
     span = falsified(before.timeline, edit.timeline, edit.at)
     if span is not None:
         who = "a correction" if edit.command_id is None else f"command {edit.command_id}"
-        text = f"{who} changed what was planned from {span[0]:.2f} s to {span[1]:.2f} s"
+        text = f"{who} changed what was planned from {clock_text(span[0])} to {clock_text(span[1])}"
         yield Mark(edit.at, MarkKind.FALSIFIED, text, span, edit.command_id)
 
 
@@ -241,5 +247,5 @@ def _described(entry: CommandRecord, receipt: Receipt) -> str:
         f"command {receipt.command_id} ({'straight line' if straight else _WORDS.get(tag, tag)}): {receipt.status}"
     )
     if receipt.execute_at is not None and receipt.end is not None:
-        text += f", {receipt.execute_at:.2f} s to {receipt.end:.2f} s"
+        text += f", {clock_text(receipt.execute_at)} to {clock_text(receipt.end)}"
     return f"{text}: {receipt.reason}" if receipt.reason else text

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interfaces.station.panels import Offer
-from robots.robot import Robot
+from robots.robot import Display, Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array, RobotModel
 
@@ -80,10 +80,11 @@ def described(robot: Robot) -> dict[str, Any]:
     """What a page needs to know of a robot: of which kind its segments are, and how they're drawn.
 
     Args:
-        robot: Of an arm, its chain is told, and the point that is drawn and dragged.
+        robot: Of an arm, its chain is told, and the point that is drawn and dragged; of a mobile robot, whether it
+            has a display.
     """
     if robot.is_base:
-        return {"segments": Offer.ARCS, "name": robot.name}
+        return {"segments": Offer.ARCS, "name": robot.name, "display": robot.device(Display) is not None}
     home, S = screws(robot.arm)
     gripper, hand = robot.hand, None
     if gripper is not None and gripper.fingers is not None:

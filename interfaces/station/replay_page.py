@@ -16,7 +16,7 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 
 from interfaces.clients.playhead import Mode
-from interfaces.recording.marks import Mark, MarkKind
+from interfaces.recording.marks import Mark, MarkKind, clock_text
 from interfaces.recording.playback import Playback, PlaybackMoment, PlaybackTrack
 from interfaces.recording.recording import shows
 from interfaces.recording.stages import Stage
@@ -250,9 +250,9 @@ def grouped(track: PlaybackTrack, start: float, end: float) -> list[dict[str, An
 
 def _group(marks: Sequence[Mark], shift: float) -> dict[str, Any]:
     first = marks[0]
-    texts = [f"{mark.t:.2f} s  {mark.text}" for mark in marks[:TEXTS]]
+    texts = [f"{clock_text(mark.t)}  {mark.text}" for mark in marks[:TEXTS]]
     if len(marks) > TEXTS:
-        texts.append(f"and {len(marks) - TEXTS} more until {marks[-1].t:.2f} s")
+        texts.append(f"and {len(marks) - TEXTS} more until {clock_text(marks[-1].t)}")
     facts: dict[str, Any] = {"t": first.t + shift, "kind": str(first.kind), "texts": texts}
     if first.span is not None:
         facts["span"] = [first.span[0] + shift, max(mark.span[1] for mark in marks if mark.span) + shift]

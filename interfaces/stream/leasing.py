@@ -61,6 +61,10 @@ class SessionState:
 class LeasedRobot(Protocol):
     """What the lease does to the robot."""
 
+    @property
+    def met(self) -> bool:
+        """Whether the real robot has been heard: before that nobody's turn to take the lease runs out."""
+
     def began(self, grant: Grant, *, now: float) -> None:
         """A lease has begun: its epoch's commands count from now on."""
 
@@ -102,6 +106,8 @@ class Classroom:
         self.offered_until = -math.inf
         self._queue: list[SessionState] = []
         self._numbers = 0
+        self._lasting = False
+        """Whether the offer stands until the robot is met."""
 
     def enter(self, seat: SessionState) -> None:
         """Give somebody a number, and a name that nobody else has."""
@@ -157,21 +163,25 @@ class Classroom:
         self._queue.insert(0, seat)
         self.offered = None
 
-    def advance(self, *, free: bool, now: float) -> bool:
+    def advance(self, *, free: bool, met: bool, now: float) -> bool:
         """Offer a free lease to the first who is here, and end an offer in time; whether anything has changed.
 
         Args:
             free: Whether the lease is free.
+            met: Whether the robot has been heard: an offer's time begins then.
             now: Session time [s].
         """
-        before = self.offered
+        before, lasted = self.offered, self._lasting
+        self._lasting = before is not None and not met
+        if self._lasting or lasted:
+            self.offered_until = now + OFFERED
         if before is not None and not (free and before.here and now < self.offered_until):
             if free and before.here:
                 self._queue.remove(before)
             self.offered = None
         if free and self.offered is None and (waiting := self.waiting):
             self.offered, self.offered_until = waiting[0], now + OFFERED
-        return self.offered is not before
+        return self.offered is not before or lasted > self._lasting
 
     def present(self, holder: SessionState | None) -> Present:
         """Who is here, those first who have the lease or wait for it."""
@@ -391,7 +401,9 @@ class Leasing:
     def _offer(self, now: float) -> None:
         """In a class, offer a free lease to the next one."""
         room = self.classroom
-        if room is not None and room.advance(free=self.lease.state is LeaseState.FREE, now=now):
+        if room is not None and room.advance(
+            free=self.lease.state is LeaseState.FREE, met=self._robot.met, now=now
+        ):
             self.version += 1
 
     def commanding(self, seat: SessionState) -> bool:

@@ -38,6 +38,8 @@ PATIENCE: Final = 3.0
 class _NoRobot:
     """What a lease does where nobody takes it."""
 
+    met = True
+
     def began(self, grant: object, *, now: float) -> None:
         """Do nothing."""
 

@@ -235,6 +235,12 @@ class LiveOperator(LeasedRobot, Workers):
         self.hub.show(state)
         return True
 
+    @property
+    @override
+    def met(self) -> bool:
+        """Whether the real robot has been heard."""
+        return self.robot.attached is not None
+
     @override
     def began(self, grant: Grant, *, now: float) -> None:
         """A lease has begun: a robot that had stopped by itself may go on."""

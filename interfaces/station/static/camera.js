@@ -140,6 +140,8 @@ export function Panel({ station }) {
   const words = useRef(null);
   const utter = (what) => camera.utter(what, words.current.value.trim());
   const message = facts?.message;
+  const { display } = station.config.robot;
+  const asked = display ? "Words to say or to show" : "Words to say";
   const speak = (id, what, text, off) => html`<button class="small" type="button" id=${id} ...${barred(off)}
     onClick=${() => utter(what)}>${text}</button>`;
   return html`<link rel="stylesheet" href="/station/camera.css" />
@@ -149,12 +151,12 @@ export function Panel({ station }) {
     <div class="drive-by"><div class="cross" role="group" aria-label="Turn the camera">
       ${BUTTONS.map((entry) => (entry ? html`<${Turn} camera=${camera} entry=${entry} why=${why} />` : html`<span></span>`))}</div>
       <p class="hint">Drag the picture, hold a button, or the keys J L I K; C looks ahead.</p></div>
-    <div class="row"><input id="camera-text" ref=${words} maxlength=${LONGEST} autocomplete="off" aria-label="Words to say or to show"
-        placeholder="Words to say or to show" onKeyDown=${(event) => event.key === "Enter" && utter("speak")} />
-      ${speak("camera-say", "speak", "Say", why)}${speak("camera-show", "show", "Show", why)}
-      ${speak("camera-clear", "clear", "Clear", why || (message ? "" : "Nothing is shown."))}</div>
+    <div class="row"><input id="camera-text" ref=${words} maxlength=${LONGEST} autocomplete="off" aria-label=${asked} placeholder=${asked}
+        onKeyDown=${(event) => event.key === "Enter" && utter("speak")} />
+      ${speak("camera-say", "speak", "Say", why)}${display && html`${speak("camera-show", "show", "Show", why)}
+      ${speak("camera-clear", "clear", "Clear", why || (message ? "" : "Nothing is shown."))}`}</div>
     <p class="refused" id="camera-refused">${camera.refused}</p>
-    <h2>On its screen</h2><p class="message" id="camera-message">${message || "Nothing"}</p>`;
+    ${display && html`<h2>On its screen</h2><p class="message" id="camera-message">${message || "Nothing"}</p>`}`;
 }
 
 function Turn({ camera, entry: [label, symbol, way], why }) {

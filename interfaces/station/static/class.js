@@ -44,8 +44,8 @@ function Present({ station: { session, config }, teaches }) {
     onClick=${() => session.wish(type, { member })}>${text}</button>`;
   return html`<section><div class="head"><h2>Here</h2><span class="hint">${members.length + others}</span></div>
     <ul class="members" id="members">${members.map((one) => html`<li key=${one.number} data-member=${one.number}>
-      <span class="name">${one.name}${one.number === lease.member && html` <span class="muted">(you)</span>`}</span>
-      <span class="muted">${standing(one)}</span>
+      <span class="who"><span class="name">${one.name}${one.number === lease.member && html` <span class="muted">(you)</span>`}</span>
+        <span class="muted">${standing(one)}</span></span>
       ${teaches && one.role !== "viewer" && one.number !== holder && one.number !== lease.member
         && act("give-control", one.number, "give", "Give control", `Give control to ${one.name}`)}
       ${teaches && one.waiting > 0 && act("withdraw", one.number, "remove", "Remove", `Take ${one.name} out of the queue`)}

@@ -73,10 +73,15 @@ export class Jogging {
     return true;
   }
 
+  /** A step as it's written. */
+  stepped(sign, unit) {
+    return `${sign < 0 ? "−" : "+"}${this.step}${unit === "°" ? "" : "\u00a0"}${unit}`;
+  }
+
   stepJoint([, which, sign]) {
     const q = this.from().q.map((x, k) => x + (k === which ? (sign * this.step) / this.unit(k).scale : 0));
     const target = { type: "joints", q };
-    this.last = { q, entry: this.order({ target }, `J${which + 1} ${sign < 0 ? "−" : "+"}${this.step}`) };
+    this.last = { q, entry: this.order({ target }, `J${which + 1} ${this.stepped(sign, this.unit(which).sign)}`) };
   }
 
   stepTool([, which, sign]) {
@@ -89,7 +94,7 @@ export class Jogging {
     const place = chain.toolOf(X).map((x, k) => (along ? x + amount * axis[k] : x));
     const turn = along ? X : multiply(exponential([...axis, 0, 0, 0], amount), [...X.slice(0, 12), 0, 0, 0, 1]);
     const next = chain.linkAt(place, turn);
-    const label = `tool ${along ? "" : "about "}${POSE[column]} ${sign < 0 ? "−" : "+"}${this.step}`;
+    const label = `tool ${along ? "" : "about "}${POSE[column]} ${this.stepped(sign, along ? "mm" : "°")}`;
     this.last = { X: next, entry: this.order(this.posed(next, "line"), label) };
   }
 

@@ -34,7 +34,7 @@ export function App({ station }) {
     <main id="work">
       <div id="pane-box">${at("pane")}</div>
       <${Splitter} />
-      <div id="side"><${Tabs} station=${station} /><div id="tab-panels">${at("side")}</div></div>
+      <div id="side"><${Tabs} station=${station} /><div id="tab-panels" tabindex="0">${at("side")}</div></div>
     </main>
     <section id="strip-box" aria-label="What was and what is planned">${at("strip")}</section>
     ${at("nowhere")}`;

@@ -22,10 +22,10 @@ const WORDS = { cancel: "Delete", via: "By another place", stop: "STOP" };
 function describe({ command, label }) {
   if (command === null) return "Undo";
   const { type } = command;
-  if (type === "move") return `Move to ${label || "a place"} at ${Math.round(100 * (command.speed ?? 1))} %`;
+  if (type === "move") return `Move: ${label || "a place"}, ${Math.round(100 * (command.speed ?? 1))}\u00a0%`;
   if (type === "retime") return `Begin at ${clockText(command.execute_at)}`;
   if (type === "scale") return `Pace × ${command.factor}`;
-  return WORDS[type] ?? type[0].toUpperCase() + type.slice(1);
+  return WORDS[type] || label || type[0].toUpperCase() + type.slice(1);
 }
 
 /** How it stands, in a word and a sentence. */

@@ -74,7 +74,7 @@ export class Recordings {
 
   async end() {
     const name = this.growing;
-    if (await this.ask("end")) this.station.announce("Recording ended: " + name);
+    if (await this.ask("end")) this.station.announce("Recording ended: " + plain(name));
   }
 
   async copy(name) {
@@ -127,7 +127,7 @@ function Begin({ recordings }) {
     event.preventDefault();
     const name = plain(event.target.elements["record-name"].value.trim());
     if (!name) return recordings.complain("The recording needs a name.");
-    if (await recordings.ask("begin", name + ".mcap")) recordings.station.announce("Recording " + name);
+    if (await recordings.ask("begin", name + ".mcap")) recordings.station.announce("Recording " + plain(name));
   }
 
   return html`<form class="row" id="record-form" onSubmit=${begin}>
@@ -143,7 +143,7 @@ function Now({ recordings, may }) {
   const left = dropped ? ` · ${dropped} messages left out: the disk is slow` : "";
   return html`<div class="recording" id="recording" data-failed=${problem ? "" : null}>
     <${Icon} name=${problem ? "error" : "fiber_manual_record"} />
-    <div class="grow"><span class="what">${problem ? "Not recording" : `Recording ${name}`}</span>
+    <div class="grow"><span class="what">${problem ? "Not recording" : `Recording ${plain(name)}`}</span>
       <span class="muted">${problem || `since ${lengthText(length)} · ${sizeText(size)}${left}`}</span></div>
     <button type="button" id="record-end" hidden=${!may} disabled=${recordings.busy} onClick=${() => recordings.end()}>
       <${Icon} name="stop" /><span>${problem ? "Put it away" : "End"}</span></button></div>`;
@@ -175,7 +175,10 @@ function Choice({ chosen }) {
 /** Asks before a recording is lost; beside the list, so that STOP stays within reach. */
 function Deletion({ item, drop, close }) {
   const keep = useRef(null);
-  useEffect(() => keep.current.focus(), []);
+  useEffect(() => {
+    keep.current.focus();
+    keep.current.closest(".deletion").scrollIntoView({ block: "nearest" });
+  }, []);
   return html`<div class="deletion" role="alertdialog" aria-label="Delete a recording" onKeyDown=${({ key }) => key === "Escape" && close()}>
     <p>Delete <b>${plain(item.name)}</b>? The file (${factsOf(item)}) is lost for everybody, and can't be brought back.</p>
     <div class="row">

@@ -2,9 +2,9 @@
 import { Controls, Help, rounded } from "./controls.js";
 import { Door } from "./door.js";
 import { Side } from "./recorded.js";
-import { KINDS, Kinds, MarkShape, SeekBar, seconds } from "./seekbar.js";
+import { KINDS, Kinds, MarkShape, SeekBar } from "./seekbar.js";
 import "./theme.js";
-import { html, observed, render, useEffect, useRef } from "./ui.js";
+import { clockText, html, observed, render, useEffect, useRef } from "./ui.js";
 
 const NAMES = ["A", "B"];
 /** What an error is called and how it's written, by its unit. */
@@ -191,8 +191,8 @@ function Facts({ replay, k, unit }) {
   const [name, written] = ERRORS[unit];
   const value = (x, say) => (x === null || x === undefined ? "–" : say(x));
   return html`<dl class="card right facts">
-      <div><dt>Own time</dt><dd class="own">${value(pane?.t, (t) => seconds(t, 3))}</dd></div>
-      <div><dt>Real robot behind</dt><dd class="behind">${value(pane?.behind, (t) => seconds(t, 3))}</dd></div>
+      <div><dt>Own time</dt><dd class="own">${value(pane?.t, (t) => clockText(t, 3))}</dd></div>
+      <div><dt>Real robot behind</dt><dd class="behind">${value(pane?.behind, (t) => `${t.toFixed(3)} s`)}</dd></div>
       <div><dt class="error-name">${name}</dt><dd class="error">${value(pane?.error, written)}</dd></div>
     </dl>
     <p class="absent card" hidden=${!pane || (pane.real && pane.virtual)}>
@@ -205,7 +205,7 @@ function Latest({ replay }) {
   if (said) return html`<p id="now" role="status"><span>${said}</span></p>`;
   if (!latest) return html`<p id="now" role="status"></p>`;
   const kind = latest.kind in KINDS ? latest.kind : "other";
-  return html`<p id="now" role="status"><${MarkShape} kind=${kind} /><b>${replay.letter(latest.k)}${seconds(latest.t)}</b>
+  return html`<p id="now" role="status"><${MarkShape} kind=${kind} /><b>${replay.letter(latest.k)}${clockText(latest.t, 2)}</b>
     <span>${KINDS[kind][0]} · ${latest.text}</span></p>`;
 }
 

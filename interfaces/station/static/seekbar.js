@@ -1,5 +1,5 @@
 // The seek bar: the place in time, marks of what happened, the loop.
-import { html, useEffect, useRef, useSignal } from "./ui.js";
+import { clockText, html, useEffect, useRef, useSignal } from "./ui.js";
 
 /** Time between two wishes while the bar is dragged [ms]. */
 const SEEKING = 33;
@@ -22,8 +22,6 @@ export const KINDS = {
   other: ["Other", "M4.6 1h2.8v3.6H11v2.8H7.4V11H4.6V7.4H1V4.6h3.6z"],
 };
 
-export const seconds = (t, digits = 2) => t.toFixed(digits) + " s";
-
 export function MarkShape({ kind, lane = "", style }) {
   return html`<svg class=${`mark kind-${kind} ${lane}`} style=${style} viewBox="0 0 12 12"><path d=${KINDS[kind][1]} fill-rule="evenodd" /></svg>`;
 }
@@ -36,7 +34,7 @@ function scale([start, end]) {
 
 /** What screen readers are told of a place on the bar. */
 const valued = ({ start, end }, t) => ({
-  role: "slider", "aria-valuemin": start.toFixed(2), "aria-valuemax": end.toFixed(2), "aria-valuenow": t.toFixed(2), "aria-valuetext": seconds(t),
+  role: "slider", "aria-valuemin": start.toFixed(2), "aria-valuemax": end.toFixed(2), "aria-valuenow": t.toFixed(2), "aria-valuetext": clockText(t, 2),
 });
 
 /** The bar with the times beside it. @param {object} replay see replay.js */
@@ -124,11 +122,11 @@ export function SeekBar({ replay }) {
       ${["start", "end"].map((end, k) => html`<${Handle} id=${`loop-${end}`} label=${`${k ? "End" : "Start"} of the loop`} at=${at}
         t=${replay.loop?.[k]} timeAt=${timeAt} move=${(t) => loopTo(k, t)} />`)}
     </div>
-    <output id="end" aria-label="Ends at">${replay.known ? seconds(at.end) : "–"}</output>
+    <output id="end" aria-label="Ends at">${replay.known ? clockText(at.end, 2) : "–"}</output>
   </div>`;
 }
 
-const Clock = ({ replay }) => html`<output id="clock" aria-label="Time shown">${replay.known ? seconds(replay.shown, 3) : "–"}</output>`;
+const Clock = ({ replay }) => html`<output id="clock" aria-label="Time shown">${replay.known ? clockText(replay.shown, 3) : "–"}</output>`;
 
 /** The slider, as screen readers know it: what it says changes with each twentieth of a second. */
 function Bar({ replay, at, bar, children, ...hands }) {
@@ -156,7 +154,7 @@ function Ticks({ at: { start, end, percent }, bar }) {
   const first = Math.ceil(start / step - 1e-9);
   const count = width.value ? Math.floor((end + 1e-9) / step) - first + 1 : 0;
   return html`<div id="ticks" aria-hidden="true">${Array.from({ length: Math.max(count, 0) }, (_, k) => (first + k) * step).map((t) =>
-    html`<span style=${{ left: percent(t) }}>${t.toFixed(step < 1 ? 1 : 0)}</span>`)}</div>`;
+    html`<span style=${{ left: percent(t) }}>${clockText(t).replace(step < 1 ? "" : ".0", "")}</span>`)}</div>`;
 }
 
 /** What is under the pointer: the time, the marks, and the part of the timeline that they changed. */
@@ -176,7 +174,7 @@ function Pointed({ pointed, near, timeAt, at, bar, letter }) {
   return html`
     ${spanned && html`<i id="span" style=${{ left: at.percent(spanned[0]), width: `${Math.max(0.15, 100 * (at.share(spanned[1]) - at.share(spanned[0])))}%` }}></i>`}
     <i id="pointer" style=${{ left: at.percent(t) }}></i>
-    <div id="tip" role="tooltip" ref=${tip}><p><b>${seconds(t)}</b></p>
+    <div id="tip" role="tooltip" ref=${tip}><p><b>${clockText(t, 2)}</b></p>
       ${found.slice(0, 4).flatMap(({ kind, k, texts }) => texts.map((text) =>
         html`<p><${MarkShape} kind=${kind} /><span>${letter(k)}${text}</span></p>`))}</div>`;
 }

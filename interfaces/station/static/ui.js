@@ -95,9 +95,9 @@ export function figure(x, digits) {
 export const degrees = (angle) => `${figure(angle * DEGREES, 1)}°`;
 
 /** Seconds of the session as m:ss.s. */
-export function clockText(t) {
-  const tenths = Math.round(Math.abs(t) * 10);
-  const minutes = Math.floor(tenths / 600);
-  const seconds = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
-  return (t < 0 ? "−" : "") + minutes + ":" + seconds;
+export function clockText(t, decimals = 1) {
+  const scale = 10 ** decimals;
+  const parts = Math.round(Math.abs(t) * scale);
+  const seconds = ((parts % (60 * scale)) / scale).toFixed(decimals).padStart(3 + decimals, "0");
+  return (t < 0 ? "−" : "") + Math.floor(parts / (60 * scale)) + ":" + seconds;
 }

@@ -120,7 +120,7 @@ def test_it_opens_and_moves_and_shows_g(files, open_page):
             drawn_as(page, 0, "virtual", site.engine.joints(t))
             drawn_as(page, 0, "real", server.playback.moment(t).frames[0].q_real)
             wait(page, "t => replay.node(0, 'vrs', 'committed').play === Math.round(100 * (t - 0.35)) / 100", t)
-            wait(page, "t => document.getElementById('clock').textContent === t.toFixed(3) + ' s'", t)
+            wait(page, "text => document.getElementById('clock').textContent === text", f"0:{t:06.3f}")
         assert page.locator(".behind").text_content() == "0.350 s"
         assert not page.locator(".own").is_visible()
         assert "a.mcap" in page.locator(".name").text_content()

@@ -11,7 +11,7 @@ import pytest
 
 import interfaces.station
 from interfaces.station.chain import described, place, screws
-from robots import puma560
+from robots import load, puma560
 from robots.robot import Gripper, Robot
 from vrs.errors import InvalidValueError
 from vrs.model import Array
@@ -92,3 +92,7 @@ def test_the_page_places_them_alike(browser: Any) -> None:
 
 def test_speeds_are_the_models() -> None:
     assert described(robot(replace(MODEL, tool_speed=0.2)))["tool_speed"] == 0.2
+
+
+def test_a_page_shows_messages_where_the_robot_has_a_display() -> None:
+    assert [described(load(name))["display"] for name in ("ipr", "cubo")] == [True, False]

@@ -148,7 +148,7 @@ def test_undo_is_redone(page: Page) -> None:
     told = page.page.locator("#receipts")
     until(lambda: f"#{second} Redo" in told.text_content())
     for move in (first, second):
-        moved_to = told.locator("li", has_text=f"#{move} Move to")
+        moved_to = told.locator("li", has_text=f"#{move} Move")
         until(lambda row=moved_to: row.get_attribute("data-status") in ("accepted", "postponed"))
     page.page.click("#redo")
     page.wait(f"{NOTICE}.includes('nothing to redo')")

@@ -25,6 +25,7 @@ class Robot:
 
     def __init__(self, stops: bool = True) -> None:
         self.hub: Hub | None = None
+        self.met = True
         self.stops, self.log, self.refusal = stops, [], ""
 
     def began(self, grant, *, now):

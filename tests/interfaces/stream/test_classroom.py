@@ -265,6 +265,22 @@ def test_who_asks_waits_in_order_and_is_offered_it():
     assert told(ada, bo, cy, now=0.8) == [2, "has it", 1]
 
 
+def test_no_turn_runs_out_before_the_robot_is_met():
+    lesson = Lesson()
+    ada, bo, cy = (lesson.pupil(name) for name in ("Ada", "Bo", "Cy"))
+    epoch = ada.ask(RequestControl, now=0.1).epoch
+    bo.ask(RequestControl, now=0.2)
+    cy.ask(RequestControl, now=0.3)
+    lesson.hub.robot.met = False
+    ada.ask(Release, epoch, now=0.5)
+    for now in (1.0, 5.0, 50.0):
+        assert told(bo, cy, now=now) == ["offered", 2]
+    lesson.hub.robot.met = True
+    assert told(bo, cy, now=60.0) == ["offered", 2]
+    assert bo.lease.offered_until == 60.0 + OFFERED
+    assert told(bo, cy, now=60.0 + OFFERED) == [0, "offered"]
+
+
 def test_nobody_has_it_who_has_not_asked_again():
     lesson = Lesson()
     ada, bo = lesson.pupil("Ada"), lesson.pupil("Bo")

@@ -28,6 +28,8 @@ from vrs.commands import PositionQuery
 class Robot:
     """What a lease does to a robot: nothing."""
 
+    met = True
+
     def began(self, grant: Grant, *, now: float) -> None: ...
 
     def ended(self, ended: Ended, *, now: float) -> None: ...
