@@ -169,9 +169,9 @@ def lab(
     robot: Annotated[
         list[str] | None,
         option(
-            "NAME[@BODY]|MODULE:NAME[@BODY]",
-            f"A mobile robot's name ({USUAL_BASE} unless given), MODULE:NAME of your own, or {BARE}: the usual one "
-            f"without physics; with @BODY in another body than its usual one, as {USUAL_BASE}@mujoco; repeatable.",
+            "NAME|FILE|MODULE:NAME[@BODY]",
+            f"A mobile robot's name ({USUAL_BASE} unless given), its file, MODULE:NAME of your own, or {BARE}: the "
+            f"usual one without physics; with @BODY in another body than its usual one, as {USUAL_BASE}@mujoco; repeatable.",
         ),
     ] = None,
     operator: Annotated[

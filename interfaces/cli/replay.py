@@ -238,7 +238,7 @@ def _serve(
 
 
 def _run_again(recordings: Sequence[Recording], as_json: bool) -> int:
-    """Run the commands of recordings again; 1 if any gives another timeline."""
+    """Run the commands of recordings again; 1 if any gives another timeline, or none that could be compared."""
     import json
 
     from interfaces.recording.rerun import rerun
@@ -246,13 +246,14 @@ def _run_again(recordings: Sequence[Recording], as_json: bool) -> int:
     same = True
     for recording in recordings:
         result = rerun(recording)
-        same = same and result.identical
+        same = same and result.identical and not result.is_void
         if as_json:
             facts = {name: getattr(result, name) for name in RERUN}
             typer.echo(json.dumps({"recording": str(recording.path), **facts}, allow_nan=False))
             continue
         what = f"{result.commands} commands and corrections, {result.versions} timelines compared"
         said = "identical" if result.identical else f"not identical: {result.difference}"
+        said = "nothing could be compared" if result.is_void else said
         typer.echo(f"{recording.path}: {said} ({what})")
         if result.missing:
             typer.echo(f"vrs: {recording.path}: {result.missing}", err=True)

@@ -120,6 +120,11 @@ class Rerun:
         return not self.difference
 
     @property
+    def is_void(self) -> bool:
+        """Whether there was something to compare, and nothing of it could be."""
+        return bool(self.missing) and not self.versions
+
+    @property
     def timeline(self) -> AnyTimeline:
         """What they made."""
         return self._engines[-1].timeline

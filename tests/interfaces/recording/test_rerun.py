@@ -129,7 +129,8 @@ def test_what_follows_a_missing_command_is_not_run_again(tmp_path):
     told(tmp_path / "run.mcap")
     with open_recording(tmp_path / "run.mcap") as recording:
         again = rerun(Without(recording, 4))
-        whole = rerun(recording)
+        whole, void = rerun(recording), rerun(Without(recording, 1))
+    assert (again.is_void, whole.is_void, void.is_void) == (False, False, True)
     assert again.missing == "command 4 is missing: what follows can't be run again"
     assert again.identical
     assert again.commands == 3
