@@ -171,7 +171,8 @@ def lab(
         option(
             "NAME|FILE|MODULE:NAME[@BODY]",
             f"A mobile robot's name ({USUAL_BASE} unless given), its file, MODULE:NAME of your own, or {BARE}: the "
-            f"usual one without physics; with @BODY in another body than its usual one, as {USUAL_BASE}@mujoco; repeatable.",
+            f"usual one without physics; with @BODY in another body than its usual one, as {USUAL_BASE}@mujoco; "
+            "repeatable.",
         ),
     ] = None,
     operator: Annotated[
