@@ -58,6 +58,11 @@ _WAITING: Final = (
 class _NoRobot(LeasedRobot):
     """Nobody has control at a relay."""
 
+    @property
+    @override
+    def met(self) -> bool:
+        return True
+
     @override
     def began(self, grant: Grant, *, now: float) -> None: ...
 
