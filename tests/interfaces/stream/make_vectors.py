@@ -242,6 +242,7 @@ def values() -> dict[str, Any]:
             2, 3, 7, 73.25, 11,
         ),
         "present: nobody": c.Present(),
+        "relays": c.Relays(("https://one.example:8701/", "http://127.0.0.1:8702/")),
         "problem": c.Problem(c.ProblemCode.STALE_EPOCH, "the lease has ended", 5),
         "state": c.State(31, 2.5, Q, 2.0, 1.0, -0.5, 0.001, 7_730_941_132_801, True, "", 2),
         "state of a halted robot": c.State(32, 2.5, Q, 2.0, 0.0, -0.5, 0.2, 0, False, "following error", 2),
