@@ -114,7 +114,7 @@ class FleetPage:
         which, operator, holder = site.config.which, site.operator, site.hub.leasing.holder
         connected, cause = site.robot.connected, operator.cause
         starting = cause is HaltCause.NOT_MET and not connected
-        trouble = "" if connected or starting else "no connection to the robot"
+        trouble = "" if connected or starting else site.robot.problem or "no connection to the robot"
         if site.twins.halted and cause not in _QUIET:
             trouble = site.twins.halted
         if holder is not None:

@@ -136,14 +136,14 @@ def test_a_cart_stops_at_another_and_the_page_says_who_is_in_trouble(browser: An
 
 
 def of(path: Path, name: str, server: Child) -> bool:
-    """Whether a process is that of a robot of a fleet that a server started."""
+    """Whether a process is that of a robot of a fleet that a server started, and not its camera's."""
     try:
         parent = (path / "stat").read_text().rpartition(")")[2].split()[1]
-        return (
-            f"fleet.toml#{name}".encode() in (path / "cmdline").read_bytes() and int(parent) == server.process.pid
-        )
+        words = (path / "cmdline").read_bytes()
     except OSError:
         return False
+    mine = b"--whereabouts" in words and f"fleet.toml#{name}".encode() in words
+    return mine and int(parent) == server.process.pid
 
 
 def test_a_fleet_of_the_docs_is_one(tmp_path: Path) -> None:
