@@ -98,14 +98,14 @@ class Member:
 
     def block(self, *, known: bool) -> Block:
         """Its box where it begins."""
-        box, (x, y, angle) = self.box, self.start
-        x, y = x - box.axle_offset * math.cos(angle), y - box.axle_offset * math.sin(angle)
-        return Block(self.robot.name, x, y, box.length, box.width, angle, box.height, known=known)
+        return replace(self.neighbour(lambda: self.start).at(0.0), known=known)
 
     def neighbour(self, where: Callable[[], Posture]) -> Neighbour:
-        """What it is to the others: its box, that moves."""
-        box, limits = self.box, self.robot.base.limits
-        fastest = limits.v_max + limits.w_max * box.radius
+        """What it is to the others: its box, that moves; an arm's base doesn't."""
+        box, fastest = self.box, 0.0
+        if self.robot.is_base:
+            limits = self.robot.base.limits
+            fastest = limits.v_max + limits.w_max * box.radius
         return Neighbour(self.robot.name, box.length, box.width, box.height, -box.axle_offset, fastest, where)
 
 

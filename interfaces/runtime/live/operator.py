@@ -354,10 +354,13 @@ def share_world(
                 other.scene.show_in(site.scene, other.config.which.name, np.linalg.inv(X_WA) @ X_WB, parts)
     if overview is None:
         return
-    host = next((site for site in sites if site.config.which.is_base), None)
-    if host is not None:
-        host.scene.show_in(overview, "room", upright(0.0, 0.0, 0.0), SURROUNDINGS)
     for site, X_WA in zip(sites, places, strict=True):
         site.scene.show_in(overview, site.config.which.name, X_WA, TWINS)
-        if host is not None and not site.config.which.is_base:
-            host.scene.show_in(site.scene, "room", np.linalg.inv(X_WA) @ np.eye(4), SURROUNDINGS)
+    for host, X_WH in zip(sites, places, strict=True):
+        if host.config.which.is_base:
+            # All of them have the same room: the first one's is shown where there's none.
+            host.scene.show_in(overview, "room", X_WH, SURROUNDINGS)
+            for site, X_WA in zip(sites, places, strict=True):
+                if not site.config.which.is_base:
+                    host.scene.show_in(site.scene, "room", np.linalg.inv(X_WA) @ X_WH, SURROUNDINGS)
+            break
