@@ -192,15 +192,13 @@ class Mirror:
         self._source = SegmentSource(self._port, resend=RESEND, applied=self._applied)
         self._port.join(self._source)
         self._journal: MirroredJournal | None = None
-        self._scene, self._scene_lacks, self._has_news = 0, False, False
+        self._scene, self._scene_gaps, self._scene_lacks, self._has_news = 0, 0, False, False
         self._due = -math.inf
 
     @property
     def gaps(self) -> int:
         """How often something was missing, and asked for."""
         return self._source.gaps + self._scene_gaps
-
-    _scene_gaps = 0
 
     @property
     def is_current(self) -> bool:
@@ -285,8 +283,7 @@ class Mirror:
         if isinstance(self.welcome, Welcome):
             if self._source.timeline is None:
                 return
-            current = lambda: self.is_current  # noqa: E731 - a property, read later
-            self._journal = MirroredJournal(self.welcome.robot, self._source, self.clock, current)
+            self._journal = MirroredJournal(self.welcome.robot, self._source, self.clock, lambda: self.is_current)
         self.site = MirroredSite(self.welcome, self._journal)
 
 
